@@ -1,0 +1,89 @@
+"""The bus as the rest of the project sees it: publish and subscribe, query and reply, presence.
+
+Every handler is called in the event loop of the task that registered it, one sample at a time, in the order in which a
+publisher sent; never from another thread. A handler must not block; what it raises is logged and counts as its own
+failure, never the bus's. Delivery is best effort on every bus: what is published while the bus is down is lost, without
+an error, and a flood drops the oldest samples first. Patterns are key expressions: `*` is one chunk, `**` any number of
+chunks, and a chunk that starts with `@` is matched by neither.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from types import TracebackType
+from typing import Protocol, Self
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One message as it arrived."""
+
+    key: str
+    payload: bytes
+
+
+class Delivery(StrEnum):
+    """How much a message matters, from the most urgent down."""
+
+    PRESENCE = "presence"  # activity and heartbeats: urgent, best effort, the newest wins
+    STATE = "state"  # last values: reliable, refreshed by their owner
+    TELEMETRY = "telemetry"  # what somebody may like to look at
+
+
+Handler = Callable[[Sample], None]
+Answer = Callable[[Sample], list[Sample]]
+PresenceHandler = Callable[[str, bool], None]
+
+
+class Registration(Protocol):
+    """Something declared on a bus that can be taken back."""
+
+    async def close(self) -> None:
+        """Take the declaration back; a second call does nothing."""
+
+
+class Publication(Registration, Protocol):
+    """The right to publish on one key, for what is sent often."""
+
+    def put(self, payload: bytes) -> None:
+        """Publish without waiting; lost silently while the bus is down."""
+
+    @property
+    def has_listeners(self) -> bool:
+        """Whether somebody subscribes to this key just now, as far as is known."""
+
+
+class Bus(Protocol):
+    """One participant's connection. Leaving the context closes it and all that was declared on it."""
+
+    def put(self, key: str, payload: bytes, delivery: Delivery) -> None:
+        """Publish without waiting; lost silently while the bus is down."""
+
+    async def publication(self, key: str, delivery: Delivery) -> Publication:
+        """Declare a key that will be published on often."""
+
+    async def subscribe(self, pattern: str, handler: Handler) -> Registration:
+        """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
+
+    async def answer(self, pattern: str, handler: Answer) -> Registration:
+        """Answer queries that match `pattern` with the samples that `handler` returns for the query's key and payload."""
+
+    async def query(self, pattern: str, payload: bytes = b"", *, timeout: float) -> list[Sample]:  # noqa: ASYNC109 - the bus's own limit, not a cancellation
+        """Ask whoever answers `pattern`; all answers that came within `timeout` seconds, possibly none."""
+
+    async def announce_presence(self, key: str) -> Registration:
+        """Be present as `key` until closed or gone, however abruptly."""
+
+    async def watch_presence(self, pattern: str, handler: PresenceHandler) -> Registration:
+        """Have `handler` called with (key, True) for each presence there is or comes, and (key, False) when it is gone."""
+
+    async def close(self) -> None:
+        """Leave the bus; a second call does nothing."""
+
+    async def __aenter__(self) -> Self:
+        """Return the open bus."""
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the bus."""

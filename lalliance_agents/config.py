@@ -1,0 +1,276 @@
+"""A mission as one frozen record: its tasks, its team, the parameters, the phases and the faults.
+
+This is what a mission file says, after checking. Everything that can be judged from the mission alone is judged here, once,
+when the record is built; whoever holds a `Mission` need not check again. An error that belongs to one place of the file
+carries the path of that place (`misplaced`), so that `mission_file` can name the line. What the environment makes of its
+own options is checked by the environment.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from graphlib import CycleError, TopologicalSorter
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic_core import PydanticCustomError
+
+from lalliance_agents.model.parameters import Architecture, Learning, NotNegative, Parameters, Positive, Record
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+"""Robots, tasks and missions: 1 to 64 of A-Z a-z 0-9 _ -, because they become chunks of keys."""
+
+
+def misplaced(path: Sequence[str | int], message: str) -> PydanticCustomError:
+    """An error that a validator of the whole mission found at the place `path` of the file."""
+    return PydanticCustomError("misplaced", "{message}", {"message": message, "path": list(path)})
+
+
+class EnvironmentChoice(Record):
+    """Which environment the mission takes place in; further fields are that environment's own options."""
+
+    model_config = ConfigDict(extra="allow")
+
+    kind: str = "task_pool"
+    """`task_pool`, `box_pushing`, or `package.module:Class` for an environment of one's own."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What the mission says for the environment itself to check."""
+        return dict(self.model_extra or {})
+
+
+class TaskSpec(Record):
+    """One task of the mission."""
+
+    after: tuple[Name, ...] = ()
+    """Tasks that must be complete before this one can be worked on."""
+    arrives: NotNegative = 0.0
+    """When the task comes into being, in seconds after the trial's start."""
+
+
+class RobotSpec(Record):
+    """One robot of the team."""
+
+    tasks: Annotated[dict[Name, Positive], Field(min_length=1)]
+    """The tasks it can do, each with the time it needs alone, in seconds."""
+    joins: NotNegative = 0.0
+    """When its process is started, in seconds after the live trial's start; 0: from the beginning."""
+    behaviors: Annotated[str, Field(pattern=r"^[\w.]+:[\w.]+$")] | None = None
+    """`package.module:factory` of behaviour sets of one's own; the default lets the world's body do the work."""
+    parameters: dict[str, Any] = {}
+    """Parameters in which this robot differs from the team."""
+
+
+class Phase(Record):
+    """A row of trials of the mission with one way of learning."""
+
+    learning: Learning = Learning.ADAPTIVE
+    """`active`: a training mission, tasks chosen at random; `adaptive`: a live one."""
+    trials: Annotated[int, Field(ge=1, le=10_000)] = 1
+    """How often the mission is repeated."""
+    until: Literal["full"] | None = None
+    """`full`: ends before `trials` are over as soon as every robot's monitors are full."""
+
+
+class CrashFault(Record):
+    """A robot's process is killed (SIGKILL) during the live trial."""
+
+    kind: Literal["crash"]
+    """`crash`."""
+    robot: Name
+    """Whose process."""
+    at: NotNegative
+    """When, in seconds after the live trial's start."""
+    restart: bool = False
+    """Whether the process is started again, with a new incarnation and the learned times it had stored."""
+    until: Positive | None = None
+    """When it is started again; default: 5 seconds after `at`."""
+
+    @property
+    def restart_at(self) -> float | None:
+        """When the process is started again, in seconds after the live trial's start; None: never."""
+        if not self.restart:
+            return None
+        return self.at + 5.0 if self.until is None else self.until
+
+    @model_validator(mode="after")
+    def _check_until(self) -> Self:
+        if self.until is not None and not self.restart:
+            raise ValueError(f"until {self.until:g} needs restart: true, a crashed robot does not return by itself")
+        if self.until is not None and self.until <= self.at:
+            raise ValueError(f"until {self.until:g} s must come after at {self.at:g} s")
+        return self
+
+
+class Mission(Record):
+    """Everything a mission file says."""
+
+    name: Name
+    """The mission's name; it is the first chunk of all its keys."""
+    environment: EnvironmentChoice = EnvironmentChoice()
+    """What the tasks are made of."""
+    tasks: Annotated[dict[Name, TaskSpec], Field(min_length=1)]
+    """The tasks, in the order that breaks ties."""
+    robots: Annotated[dict[Name, RobotSpec], Field(min_length=1)]
+    """The team."""
+    parameters: Parameters = Parameters()
+    """Parameters of every robot."""
+    phases: Annotated[tuple[Phase, ...], Field(min_length=1)] = (Phase(),)
+    """Trials, one phase after the other; the last trial of all is the live one: its time is the makespan."""
+    faults: tuple[CrashFault, ...] = ()
+    """Faults of the live trial."""
+    knowledge: Literal["none", "given"] = "none"
+    """What robots know before the first trial: nothing, or the true times of all who share their tasks."""
+    control_period: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.1
+    """Time between two control steps of a robot, in seconds."""
+    deadline: Positive = 600.0
+    """A trial that is not complete after this many seconds has failed."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """All randomness of a run comes from this number."""
+
+    @field_validator("tasks", mode="before")
+    @classmethod
+    def _empty_task_means_defaults(cls, value: object) -> object:
+        if isinstance(value, Mapping):
+            return {name: {} if task is None else task for name, task in value.items()}
+        return value
+
+    @model_validator(mode="after")
+    def _check_together(self) -> Self:
+        self._check_tasks()
+        self._check_abilities()
+        self._check_rates()
+        self._check_faults()
+        return self
+
+    def _check_tasks(self) -> None:
+        for name, task in self.tasks.items():
+            for index, needed in enumerate(task.after):
+                if needed not in self.tasks:
+                    raise misplaced(
+                        ("tasks", name, "after", index),
+                        f"{needed!r} is not a task of this mission{_like(needed, self.tasks)}",
+                    )
+        try:
+            TopologicalSorter({name: task.after for name, task in self.tasks.items()}).prepare()
+        except CycleError as error:
+            circle = " after ".join(error.args[1])
+            raise misplaced(
+                ("tasks", error.args[1][0], "after"), f"the prerequisites form a circle: {circle}"
+            ) from None
+
+    def _check_abilities(self) -> None:
+        for name, robot in self.robots.items():
+            for task in robot.tasks:
+                if task not in self.tasks:
+                    raise misplaced(
+                        ("robots", name, "tasks", task),
+                        f"{task!r} is not a task of this mission{_like(task, self.tasks)}",
+                    )
+        for task in self.tasks:
+            if not self.able(task):
+                raise misplaced(("tasks", task), "no robot can do this task; expected at least one robot that lists it")
+
+    def _check_rates(self) -> None:
+        for name in self.robots:
+            own = self.parameters_of(name)
+            if own.broadcast_period < self.control_period * (1 - 1e-9):
+                raise misplaced(
+                    self._where(name, "broadcast_rate"),
+                    f"robot {name} cannot send {own.broadcast_rate:g} messages/s with a control_period of "
+                    f"{self.control_period:g} s; expected at most {1 / self.control_period:g}",
+                )
+            for teammate in self.teammates(name):
+                theirs = self.parameters_of(teammate)
+                if own.silence_timeout <= 2 * theirs.broadcast_period:
+                    raise misplaced(
+                        self._where(name, "silence_timeout"),
+                        f"silence_timeout {own.silence_timeout:g} s of robot {name} must be longer than two broadcast "
+                        f"periods of {teammate}, 2/broadcast_rate = {2 * theirs.broadcast_period:g} s",
+                    )
+
+    def _where(self, robot: str, field: str) -> tuple[str, ...]:
+        own = self.robots[robot].parameters
+        return ("robots", robot, "parameters", field) if field in own else ("parameters", field)
+
+    def _check_faults(self) -> None:
+        for index, fault in enumerate(self.faults):
+            if fault.robot not in self.robots:
+                raise misplaced(
+                    ("faults", index, "robot"),
+                    f"{fault.robot!r} is not a robot of this mission{_like(fault.robot, self.robots)}",
+                )
+            if fault.at >= self.deadline:
+                raise misplaced(
+                    ("faults", index, "at"), f"{fault.at:g} s is not before the mission's deadline, {self.deadline:g} s"
+                )
+
+    def able(self, task: str) -> list[str]:
+        """The robots that can do `task`, in the mission's order."""
+        return [name for name, robot in self.robots.items() if task in robot.tasks]
+
+    def teammates(self, robot: str) -> list[str]:
+        """The other robots that share a task with `robot`, in the mission's order."""
+        own = self.robots[robot].tasks.keys()
+        return [name for name, other in self.robots.items() if name != robot and own & other.tasks.keys()]
+
+    def parameters_of(self, robot: str) -> Parameters:
+        """The parameters in force for `robot`."""
+        return self._parameters[robot]
+
+    @cached_property
+    def _parameters(self) -> dict[str, Parameters]:
+        return {name: self._override(name, spec.parameters) for name, spec in self.robots.items()}
+
+    def _override(self, robot: str, changes: dict[str, Any]) -> Parameters:
+        if not changes:
+            return self.parameters
+        base = self.parameters.model_dump(exclude_unset=True)
+        try:
+            return Parameters.model_validate({**base, **changes})
+        except ValidationError as error:
+            first = error.errors()[0]
+            path = ("robots", robot, "parameters", *first["loc"])
+            message = first["msg"].removeprefix("Value error, ")
+            if first["type"] == "extra_forbidden":
+                message = (
+                    f"unknown parameter {first['loc'][-1]!r}{_like(str(first['loc'][-1]), Parameters.model_fields)}"
+                )
+            raise misplaced(path, message) from None
+
+    @property
+    def live(self) -> Phase:
+        """The phase whose last trial is the live one."""
+        return self.phases[-1]
+
+    def warnings(self) -> list[str]:
+        """Sentences about values that are allowed and probably not meant."""
+        found = []
+        times = [time for robot in self.robots.values() for time in robot.tasks.values()]
+        mean = sum(times) / len(times)
+        delay = self.parameters.max_delay
+        if self.parameters.architecture is Architecture.L_ALLIANCE and delay > 0.05 * mean:
+            found.append(
+                f"parameters.max_delay: {delay:g} s is {delay / mean:.0%} of the mean task time ({mean:.3g} s); "
+                "above 5 % robots spend a noticeable part of the mission waiting"
+            )
+        for index, fault in enumerate(self.faults):
+            if self._last_able(fault):
+                found.append(
+                    f"faults.{index}: {fault.robot} is the only robot for {', '.join(self._last_able(fault))}; "
+                    "the mission cannot complete if that is still open"
+                )
+        return found
+
+    def _last_able(self, fault: CrashFault) -> list[str]:
+        if fault.restart:
+            return []
+        return [task for task in self.robots[fault.robot].tasks if self.able(task) == [fault.robot]]
+
+
+def _like(word: str, known: Mapping[str, object]) -> str:
+    """`; did you mean …?` if one of `known` is spelled much like `word`, else nothing."""
+    from difflib import get_close_matches
+
+    close = get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"; did you mean {close[0]!r}?" if close else ""
