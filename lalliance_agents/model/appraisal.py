@@ -1,0 +1,220 @@
+"""What a robot makes of one task at one instant: every factor of the motivation, from what it heard and what it knows.
+
+This is the lower half of the Appendix, put together: which category a task is in, how impatient the robot is about it, what
+suppresses it. Nothing is changed here and nothing is decided; `mind` does both. Each doubtful place of the Appendix is
+decided by the reading of its `Erratum`.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lalliance_agents.model import equations
+from lalliance_agents.model.events import Factors, Pace, Teammate
+from lalliance_agents.model.hearing import Contact, Hearing
+from lalliance_agents.model.knowledge import Knowledge
+from lalliance_agents.model.motivation import Motivation
+from lalliance_agents.model.parameters import Architecture, Erratum, Parameters
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What all sets of a robot have in common at one step."""
+
+    now: float
+    before: float
+    """The step before: what was heard since is news."""
+    present: Sequence[str]
+    boredom: float
+    waiting: bool
+    """Whether motivation has to wait for the roster (erratum 4)."""
+
+
+class Appraisal:
+    """Computes the factors of one robot's behaviour sets.
+
+    Args:
+        parameters: the robot's parameters.
+        knowledge: its learned times.
+        hearing: what it has heard.
+    """
+
+    def __init__(self, parameters: Parameters, knowledge: Knowledge, hearing: Hearing) -> None:
+        self._parameters = parameters
+        self._knowledge = knowledge
+        self._hearing = hearing
+        self._learns = parameters.architecture is Architecture.L_ALLIANCE
+        literal = parameters.is_literal
+        self._influence_on_active = literal(Erratum.INFLUENCE_ON_ACTIVE)
+        self._reset_on_active = literal(Erratum.RESET_ON_ACTIVE)
+        self._slowest_of_all = literal(Erratum.SLOWEST_OF_WHOM)
+        self._learning_looks_back = literal(Erratum.LEARNING_WINDOW)
+        self._gives_up = not literal(Erratum.GIVE_UP_RULE)
+
+    def adaptive(self, one: Motivation, moment: Moment, *, suppressed: bool) -> Factors:
+        """The factors of `one` in the adaptive phase; its motivation is left at 0 for the caller to fill in."""
+        now, own_time = moment.now, self._knowledge.own_time(one.task)
+        best_time = self._knowledge.best_time(one.task, moment.present)
+        contended = self._hearing.anybody_on(one.task, now)
+        category = equations.task_category(
+            own_time, best_time, contended, self._knowledge.knows_teammates, self._parameters.ordering
+        )
+        fast = self._fast_rate(one, category, own_time)
+        pace, rate = self._impatience(one, moment, own_time, fast)
+        psi, lambda_ = self._patience_with_oneself(one.task, own_time, best_time)
+        return Factors(
+            motivation=0.0,
+            pace=pace,
+            rate=rate,
+            delay=self._parameters.threshold / fast,
+            category=category,
+            own_time=own_time,
+            best_time=best_time,
+            boredom=moment.boredom,
+            sensory_feedback=one.sensory_feedback,
+            activity_suppression=0 if suppressed else 1,
+            impatience_reset=self._reset(one, moment),
+            acquiescence=equations.acquiescence(one.active_for(now), psi, contended, lambda_),
+            learned_robot_influence=self._influence(one, moment, category),
+            psi=psi,
+            lambda_=lambda_,
+        )
+
+    def learning(self, one: Motivation, moment: Moment, *, suppressed: bool) -> Factors:
+        """The factors of `one` in the active learning phase: no impatience, no acquiescence, no giving up."""
+        own_time = self._knowledge.own_time(one.task)
+        return Factors(
+            motivation=0.0,
+            pace=self._pace(one, moment, Pace.RANDOM),
+            rate=0.0,
+            delay=0.0,
+            category=2,
+            own_time=own_time,
+            best_time=self._knowledge.best_time(one.task, moment.present),
+            boredom=moment.boredom,
+            sensory_feedback=one.sensory_feedback,
+            activity_suppression=0 if suppressed else 1,
+            impatience_reset=1 if one.active else equations.learning_impatience(self._taken(one.task, moment)),
+            acquiescence=1,
+            learned_robot_influence=1,
+            psi=math.inf,
+            lambda_=math.inf,
+        )
+
+    def teammates(self, task: str, now: float) -> tuple[Teammate, ...]:
+        """What is known of all who were heard on `task`, the last one heard first."""
+        own_time = self._knowledge.own_time(task)
+        found = [
+            Teammate(
+                robot=contact.robot,
+                first_heard=contact.first,
+                last_heard=contact.last,
+                lapsed_at=contact.lapsed_at,
+                present=self._hearing.is_present(contact.robot, now),
+                patience=self._patience(contact, task, own_time),
+                task_time=self._knowledge.time_of(contact.robot, task),
+            )
+            for contact in self._hearing.contacts(task)
+        ]
+        return tuple(sorted(found, key=lambda one: (-one.last_heard, one.robot)))
+
+    def rival(self, one: Motivation, me: str, now: float) -> str | None:
+        """A teammate that started the same task at the same time and expects to be faster (erratum 15)."""
+        if one.active_since is None:
+            return None
+        window = self._parameters.effective_collision_window
+        for contact in self._hearing.contacts(one.task):
+            if (
+                self._hearing.is_on(contact, now)
+                and equations.collides(one.active_since, contact.started, window)
+                and (contact.expected, contact.robot) < (one.expected, me)
+            ):
+                return contact.robot
+        return None
+
+    def expected_time(self, task: str) -> float:
+        """The time that this robot announces to need for `task`, in seconds."""
+        if not self._learns:
+            return self._parameters.for_set(task).yield_time
+        own_time = self._knowledge.own_time(task)
+        return self._parameters.initial_task_time if math.isnan(own_time) else own_time
+
+    def _taken(self, task: str, moment: Moment) -> bool:
+        if not self._learning_looks_back:
+            return self._hearing.anybody_on(task, moment.now)
+        return any(contact.robot in moment.present for contact in self._hearing.contacts(task))
+
+    def _fast_rate(self, one: Motivation, category: int, own_time: float) -> float:
+        parameters = self._parameters
+        if not self._learns:
+            return parameters.for_set(one.task).fast_rate
+        low, high = self._knowledge.span(own_time)
+        wait = equations.delay(
+            parameters.ordering,
+            category,
+            own_time,
+            low,
+            self._knowledge.scale(low, high),
+            parameters.min_delay,
+            parameters.max_delay,
+            one.draw,
+        )
+        return equations.fast_rate(parameters.threshold, wait)
+
+    def _impatience(self, one: Motivation, moment: Moment, own_time: float, fast: float) -> tuple[Pace, float]:
+        """impatience_ij(t): the least delta_slow of those who hold this robot back, else delta_fast."""
+        slow, everybody = [], []
+        for contact in self._hearing.contacts(one.task):
+            phi = self._patience(contact, one.task, own_time)
+            rate = self._slow_rate(one.task, phi)
+            everybody.append(rate)
+            on_task = self._hearing.is_on(contact, moment.now)
+            if equations.holds_back(on_task, self._hearing.heard_until(contact, moment.now - phi)):
+                slow.append(rate)
+        if slow and self._slowest_of_all:
+            slow = everybody
+        pace, rate = (Pace.SLOW, min(slow)) if slow else (Pace.FAST, fast)
+        if math.isnan(rate):
+            return Pace.UNDEFINED, 0.0
+        return self._pace(one, moment, pace), rate
+
+    @staticmethod
+    def _pace(one: Motivation, moment: Moment, pace: Pace) -> Pace:
+        if one.active:
+            return Pace.WORKING
+        return Pace.WAITING if moment.waiting else pace
+
+    def _patience(self, contact: Contact, task: str, own_time: float) -> float:
+        if not self._learns:
+            return self._parameters.for_set(task).patience
+        their_time = self._knowledge.time_of(contact.robot, task)
+        return equations.patience(self._parameters.strategy, own_time, own_time if their_time is None else their_time)
+
+    def _slow_rate(self, task: str, phi: float) -> float:
+        if not self._learns:
+            return self._parameters.for_set(task).slow_rate
+        return equations.slow_rate(self._parameters.threshold, phi)
+
+    def _patience_with_oneself(self, task: str, own_time: float, best_time: float) -> tuple[float, float]:
+        """The times psi and lambda, in seconds."""
+        parameters = self._parameters
+        if not self._learns:
+            by_hand = parameters.for_set(task)
+            return by_hand.yield_time, by_hand.give_up_time
+        give_up = equations.give_up_time(parameters.give_up_factor, own_time) if self._gives_up else math.inf
+        return equations.yield_time(parameters.strategy, own_time, best_time), give_up
+
+    def _reset(self, one: Motivation, moment: Moment) -> int:
+        if one.active and not self._reset_on_active:
+            return 1
+        return equations.impatience_reset(
+            any(
+                self._hearing.first_heard_within(contact, moment.before, moment.now)
+                for contact in self._hearing.contacts(one.task)
+            )
+        )
+
+    def _influence(self, one: Motivation, moment: Moment, category: int) -> int:
+        if not self._learns or (one.active and not self._influence_on_active):
+            return 1
+        return equations.learned_robot_influence(moment.boredom, self._parameters.boredom_threshold, category)

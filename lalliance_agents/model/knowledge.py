@@ -1,0 +1,107 @@
+"""What a robot takes the times of its team to be: the monitors of all its behaviour sets, read together.
+
+Here stands what replaces an unknown time (erratum 10): the robot's own unknown time is the largest it knows of, or
+`initial_task_time` where it knows nothing; a teammate's unknown time is left out. `low` and `high` range over every robot
+and task known, for tasks this robot can do.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from lalliance_agents.model.equations import scale_factor
+from lalliance_agents.model.monitor import Monitor, Record
+from lalliance_agents.model.parameters import Erratum, Parameters
+
+
+class Knowledge:
+    """Learned times of one robot.
+
+    Args:
+        me: the robot itself.
+        tasks: the tasks it can do.
+        parameters: its parameters.
+    """
+
+    def __init__(self, me: str, tasks: Sequence[str], parameters: Parameters) -> None:
+        self._me = me
+        self._parameters = parameters
+        self._undefined_if_unknown = parameters.is_literal(Erratum.UNKNOWN_TIMES)
+        self._self_counts = not parameters.is_literal(Erratum.SELF_PRESENCE)
+        self.monitors = {task: Monitor(me, parameters) for task in tasks}
+        self._seen = -1
+        self._low = self._high = math.nan
+        self._knows_teammates = False
+
+    def _read(self) -> None:
+        seen = sum(monitor.version for monitor in self.monitors.values())
+        if seen == self._seen:
+            return
+        self._seen = seen
+        known = [(robot, time) for monitor in self.monitors.values() for robot, time in monitor.times()]
+        self._low = min((time for _, time in known), default=math.nan)
+        self._high = max((time for _, time in known), default=math.nan)
+        self._knows_teammates = any(robot != self._me for robot, _ in known)
+
+    def own_time(self, task: str) -> float:
+        """task_time_i(i, j, t) in seconds, or what stands for it; NaN if erratum 10 is read literally."""
+        monitor = self.monitors[task]
+        time = monitor.task_time(self._me)
+        if time is not None:
+            return time
+        if self._undefined_if_unknown:
+            return math.nan
+        self._read()
+        fallback = self._parameters.initial_task_time if math.isnan(self._high) else self._high
+        return max(fallback, monitor.floor(self._me))
+
+    def best_time(self, task: str, present: Sequence[str]) -> float:
+        """The least task time of the robots present, this one included (erratum 3), in seconds; else infinity."""
+        monitor = self.monitors[task]
+        best = self.own_time(task) if self._self_counts else math.inf
+        for robot in present:
+            time = monitor.task_time(robot)
+            if time is not None and time < best:
+                best = time
+        return best
+
+    def time_of(self, robot: str, task: str) -> float | None:
+        """task_time_i(k, j, t) in seconds; None if unknown."""
+        return self.monitors[task].task_time(robot)
+
+    def span(self, own_time: float) -> tuple[float, float]:
+        """`low` and `high` over all that is known, widened to `own_time`, in seconds."""
+        self._read()
+        if math.isnan(self._low):
+            return own_time, own_time
+        return min(self._low, own_time), max(self._high, own_time)
+
+    def scale(self, low: float, high: float) -> float:
+        """The scale factor of the delays."""
+        return scale_factor(self._parameters.min_delay, self._parameters.max_delay, low, high)
+
+    @property
+    def knows_teammates(self) -> bool:
+        """Whether category 1 exists: some teammate's time for some task is known (erratum 10)."""
+        self._read()
+        return self._knows_teammates or self._undefined_if_unknown
+
+    def fewest(self, teammates: Mapping[str, frozenset[str]]) -> int:
+        """The smallest number of samples kept of any robot for a task it shares with this one, itself included.
+
+        Args:
+            teammates: the tasks that each teammate can do.
+        """
+        counts = [monitor.count(self._me) for monitor in self.monitors.values()]
+        for robot, tasks in teammates.items():
+            counts += [self.monitors[task].count(robot) for task in tasks if task in self.monitors]
+        return min(counts, default=0)
+
+    def records(self) -> dict[str, dict[str, Record]]:
+        """All that was learned: task -> robot -> record."""
+        return {task: monitor.records() for task, monitor in self.monitors.items()}
+
+    def restore(self, records: Mapping[str, Mapping[str, Record]]) -> None:
+        """Take what was learned earlier, for the tasks this robot has."""
+        for task, monitor in self.monitors.items():
+            if task in records:
+                monitor.restore(records[task])

@@ -1,0 +1,294 @@
+"""The mind of one robot: events in, commands out.
+
+A driver hands in what the robot perceives (`handle`) and calls `tick` once per control period. A tick computes the factors
+of every behaviour set, lets motivations grow or fall, stops the active set or starts one, and says what to broadcast. All
+that is decided carries the factors behind it. Sets are suppressed by the set that was active when the tick began, so a robot
+that stops one task begins to want another from the next tick on.
+"""
+
+from collections.abc import Callable, Sequence
+
+from lalliance_agents.model import equations
+from lalliance_agents.model.appraisal import Appraisal, Moment
+from lalliance_agents.model.events import (
+    Activate,
+    Announce,
+    BodyFailed,
+    Cause,
+    Command,
+    Deactivate,
+    Decision,
+    Event,
+    Factors,
+    Heard,
+    Pace,
+    RosterKnown,
+    Sensed,
+    Teammate,
+    TrialStarted,
+    Verb,
+)
+from lalliance_agents.model.hearing import Hearing
+from lalliance_agents.model.knowledge import Knowledge
+from lalliance_agents.model.motivation import Motivation
+from lalliance_agents.model.parameters import SLACK, Architecture, Erratum, Learning, Parameters
+
+#: Ends of an attempt after which the robot is not held to have failed.
+_BLAMELESS = {Cause.COLLISION, Cause.INAPPLICABLE, Cause.NEW_TRIAL}
+
+_VERBS = {
+    Cause.SENSED: Verb.COMPLETE,
+    Cause.COLLISION: Verb.YIELD,
+    Cause.CONTENDER: Verb.YIELD,
+    Cause.NO_SUCCESS: Verb.GIVE_UP,
+}
+
+
+class Mind:
+    """L-ALLIANCE for one robot.
+
+    Args:
+        me: the robot's name.
+        tasks: the tasks it can do, in the mission's order, which breaks ties.
+        parameters: its parameters.
+        now: the instant of its birth.
+        draw: source of numbers in [0, 1); the model has no other randomness.
+    """
+
+    def __init__(
+        self, me: str, tasks: Sequence[str], parameters: Parameters, *, now: float, draw: Callable[[], float]
+    ) -> None:
+        self.me = me
+        self.parameters = parameters
+        self.knowledge = Knowledge(me, tasks, parameters)
+        self.hearing = Hearing(
+            parameters.silence_timeout,
+            closed=not parameters.is_literal(Erratum.WINDOW_ENDS),
+            per_attempt=not parameters.is_literal(Erratum.SECOND_PATIENCE),
+        )
+        self._appraisal = Appraisal(parameters, self.knowledge, self.hearing)
+        self._draw = draw
+        self._sets = {task: Motivation(task, 0.0) for task in tasks}
+        self._roster: frozenset[str] | None = None
+        self._before = now
+        self._broadcast_due = now
+        self._pending: list[Command] = []
+        self._many = parameters.is_literal(Erratum.ONE_ACTIVE)
+        self._beats = not parameters.is_literal(Erratum.IDLE_HEARTBEAT)
+        self._collisions = not parameters.is_literal(Erratum.COLLISION)
+        self._bored_at_work = parameters.is_literal(Erratum.BOREDOM_AT_WORK) and len(self._sets) == 1
+        self._begin_trial(Learning.ADAPTIVE, now)
+
+    def __repr__(self) -> str:
+        return f"<Mind {self.me}: {', '.join(self.active) or 'idle'}, {len(self._sets)} sets>"
+
+    def _begin_trial(self, learning: Learning, now: float) -> None:
+        self._learning = learning
+        self._born = now
+        self._waiting = self._beats
+        self._idle_since = now
+        self.hearing.forget()
+        for one in self._sets.values():
+            if one.active:
+                self._pending.append(Deactivate(self._stop(one, now, Cause.NEW_TRIAL, None)))
+            self._sets[one.task] = Motivation(one.task, self._draw(), since=now)
+            self.knowledge.monitors[one.task].new_trial()
+
+    @property
+    def active(self) -> list[str]:
+        """The tasks whose sets are active: at most one, unless erratum 5 is read literally."""
+        return [task for task, one in self._sets.items() if one.active]
+
+    def factors(self) -> dict[str, Factors]:
+        """What produced each motivation at the last tick."""
+        return {task: one.factors for task, one in self._sets.items() if one.factors is not None}
+
+    def handle(self, event: Event, now: float) -> None:
+        """Take in what was perceived at `now`; what follows from it is decided at the next tick."""
+        match event:
+            case Heard():
+                self._hear(event, now)
+            case Sensed() if event.task in self._sets:
+                self._sense(event, self._sets[event.task], now)
+            case BodyFailed() if event.task in self._sets:
+                self._sets[event.task].body_failed = self._sets[event.task].active
+            case TrialStarted():
+                self._begin_trial(event.learning, now)
+            case RosterKnown():
+                self._roster = event.robots - {self.me}
+            case _:
+                pass  # about a task this robot cannot do
+
+    def _hear(self, event: Heard, now: float) -> None:
+        if event.robot == self.me:
+            return
+        self.hearing.heard(event.robot, now)
+        for task, monitor in self.knowledge.monitors.items():
+            if task != event.task:
+                monitor.elsewhere(event.robot, now)
+        if event.task is None or event.task not in self._sets:
+            return
+        workable = self._sets[event.task].sensory_feedback == 1
+        monitor = self.knowledge.monitors[event.task]
+        fresh = workable and monitor.observe(event.robot, now, event.active_for)
+        self.hearing.heard_on(
+            event.robot, event.task, now, active_for=event.active_for, expected=event.expected, fresh=fresh
+        )
+
+    def _sense(self, event: Sensed, one: Motivation, now: float) -> None:
+        monitor = self.knowledge.monitors[event.task]
+        if event.complete and not one.complete:
+            monitor.completed(now)
+        elif not event.applicable and one.applicable:
+            monitor.interrupted(now)
+        one.complete, one.applicable = event.complete, event.applicable
+
+    def tick(self, now: float) -> list[Command]:
+        """One control step; `now` never falls. Returns what the body and the radio are to do, in order."""
+        before, self._before = self._before, now
+        self.hearing.note_lapses(now)
+        for monitor in self.knowledge.monitors.values():
+            monitor.settle(now)
+        commands, self._pending = self._pending, []
+        working = self.active
+        moment = self._moment(now, before, working)
+        for one in self._sets.values():
+            suppressed = any(task != one.task for task in working)
+            factors = self._appraise(one, moment, suppressed=suppressed)
+            if one.active:
+                one.factors = factors._replace(motivation=one.value(now))
+                commands += self._continue(one, now)
+            else:
+                self._grow(one, factors, moment)
+        activations = self._activate(now)
+        return commands + activations + self._announce(now, before, urgent=bool(activations))
+
+    def _moment(self, now: float, before: float, working: list[str]) -> Moment:
+        if self._waiting and self._roster_heard(now):
+            self._waiting = False
+            self._idle_since = before
+        idle = self._bored_at_work or not working
+        idle_for = now - self._idle_since if idle and not self._waiting else 0.0
+        bored = equations.boredom(self.parameters.effective_boredom_rate, idle_for)
+        return Moment(now, before, self.hearing.robots_present(now), bored, self._waiting)
+
+    def _roster_heard(self, now: float) -> bool:
+        """Erratum 4: the roster was heard, or one tau has passed."""
+        if self._roster is not None and self.hearing.has_heard(self._roster):
+            return True
+        return equations.reaches(now - self._born, self.parameters.silence_timeout)
+
+    def _appraise(self, one: Motivation, moment: Moment, *, suppressed: bool) -> Factors:
+        if self._learning is Learning.ACTIVE and self.parameters.architecture is Architecture.L_ALLIANCE:
+            return self._appraisal.learning(one, moment, suppressed=suppressed)
+        return self._appraisal.adaptive(one, moment, suppressed=suppressed)
+
+    def _grow(self, one: Motivation, factors: Factors, moment: Moment) -> None:
+        """m_ij(t) of a set that is not active."""
+        gates = (
+            factors.sensory_feedback,
+            factors.activity_suppression,
+            factors.impatience_reset,
+            factors.acquiescence,
+            factors.learned_robot_influence,
+        )
+        one.grow(0.0 if moment.waiting else factors.rate, moment.before)
+        increment = one.rate * (moment.now - one.since)
+        if factors.pace is Pace.RANDOM and all(gates):
+            increment = self.parameters.threshold * self._draw()
+        value = equations.motivation(one.base, increment, *gates)
+        if value <= 0.0 or factors.pace is Pace.RANDOM:
+            one.hold(value, moment.now)
+        one.factors = factors._replace(motivation=value)
+
+    def _continue(self, one: Motivation, now: float) -> list[Command]:
+        """Let the active set go on, or stop it."""
+        cause, other = self._reason_to_stop(one, now)
+        return [] if cause is None else [Deactivate(self._stop(one, now, cause, other))]
+
+    def _reason_to_stop(self, one: Motivation, now: float) -> tuple[Cause | None, str | None]:
+        factors = one.factors
+        assert factors is not None  # noqa: S101 - set by `tick` just before
+        rival = self._appraisal.rival(one, self.me, now) if self._collisions else None
+        contender = next((mate.robot for mate in self._contenders(one, now)), None)
+        reasons: list[tuple[bool, Cause, str | None]] = [
+            (one.complete, Cause.SENSED, None),
+            (factors.sensory_feedback == 0, Cause.INAPPLICABLE, None),
+            (one.body_failed, Cause.BODY_FAILED, None),
+            (rival is not None, Cause.COLLISION, rival),
+            (
+                factors.acquiescence == 0
+                and contender is not None
+                and equations.more_than(one.active_for(now), factors.psi),
+                Cause.CONTENDER,
+                contender,
+            ),
+            (factors.acquiescence == 0, Cause.NO_SUCCESS, None),
+            (factors.impatience_reset == 0, Cause.RESET, contender),
+            (factors.learned_robot_influence == 0, Cause.NOT_BEST, None),
+            (factors.activity_suppression == 0, Cause.SUPPRESSED, None),
+        ]
+        return next(((cause, other) for holds, cause, other in reasons if holds), (None, None))
+
+    def _contenders(self, one: Motivation, now: float) -> list[Teammate]:
+        return [mate for mate in self._appraisal.teammates(one.task, now) if mate.lapsed_at is None]
+
+    def _stop(self, one: Motivation, now: float, cause: Cause, other: str | None) -> Decision:
+        decision = self._decision(one, now, _VERBS.get(cause, Verb.DROP), cause, other)
+        if cause is not Cause.SENSED:
+            self.knowledge.monitors[one.task].ceased(now, failed=cause not in _BLAMELESS)
+        one.deactivate(now)
+        if not self._bored_at_work:
+            self._idle_since = now
+        return decision
+
+    def _decision(self, one: Motivation, now: float, verb: Verb, cause: Cause, other: str | None) -> Decision:
+        factors = one.factors
+        assert factors is not None  # noqa: S101 - a set is appraised before anything is decided about it
+        teammates = self._appraisal.teammates(one.task, now)
+        return Decision(now, verb, one.task, cause, factors, teammates, one.active_for(now), other)
+
+    def _activate(self, now: float) -> list[Command]:
+        """Erratum 5: incumbent first, then the highest motivation, then the lowest task index."""
+        theta = self.parameters.threshold
+        ready = [one for one in self._sets.values() if not one.active and equations.reaches(one.value(now), theta)]
+        if not self._many:
+            if not ready or self.active:
+                return []
+            highest = max(one.value(now) for one in ready)
+            ready = [next(one for one in ready if one.value(now) >= highest - SLACK)]
+            for one in self._sets.values():
+                if one is not ready[0]:
+                    one.hold(0.0, now)
+        return [Activate(self._start(one, now)) for one in ready]
+
+    def _start(self, one: Motivation, now: float) -> Decision:
+        cause, other = self._occasion(one.task, now)
+        decision = self._decision(one, now, Verb.ACTIVATE, cause, other)
+        one.activate(now, self._appraisal.expected_time(one.task))
+        self.knowledge.monitors[one.task].began(now)
+        return decision
+
+    def _occasion(self, task: str, now: float) -> tuple[Cause, str | None]:
+        """Whose task this was, and why it can be taken."""
+        teammates = self._appraisal.teammates(task, now)
+        if not teammates:
+            return Cause.FREE, None
+        latest = teammates[0]
+        if latest.lapsed_at is None:
+            return Cause.IMPATIENCE, latest.robot
+        return (Cause.RELEASED if latest.present else Cause.SILENCE), latest.robot
+
+    def _announce(self, now: float, before: float, *, urgent: bool) -> list[Command]:
+        """Broadcast at rate rho, by the tick nearest to the instant due, and at once on activation."""
+        half_a_step = (now - before) / 2
+        if not urgent and now < self._broadcast_due - half_a_step - SLACK:
+            return []
+        period = self.parameters.broadcast_period
+        kept = self._broadcast_due + period
+        self._broadcast_due = kept if not urgent and kept > now else now + period
+        working = self.active
+        if working:
+            one = self._sets[working[0]]
+            return [Announce(one.task, one.active_for(now), one.expected)]
+        return [Announce(None)] if self._beats else []
