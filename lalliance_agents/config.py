@@ -1,28 +1,55 @@
 """A mission as one frozen record: its tasks, its team, the parameters, the phases and the faults.
 
-This is what a mission file says, after checking. Everything that can be judged from the mission alone is judged here, once,
-when the record is built; whoever holds a `Mission` need not check again. An error that belongs to one place of the file
-carries the path of that place (`misplaced`), so that `mission_file` can name the line. What the environment makes of its
-own options is checked by the environment.
+This is what a mission file says, after checking. Everything that can be judged from the mission alone is judged here,
+once, when the record is built; whoever holds a `Mission` need not check again. An error that belongs to one place of
+the file carries the path of that place (`misplaced`), so that `mission_file` can name the line. What the environment
+makes of its own options is checked by the environment.
 """
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
+from math import inf
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, ValidationError, field_validator, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import ConfigDict, Field, GetPydanticSchema, ValidationError, model_validator
+from pydantic_core import ErrorDetails, PydanticCustomError, core_schema, to_json
 
 from lalliance_agents.model.parameters import Architecture, Learning, NotNegative, Parameters, Positive, Record
+from lalliance_agents.wire.keys import NAME_PATTERN
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+_DOTTED = r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*"
+FACTORY_PATTERN = f"^{_DOTTED}:{_DOTTED}$"
+ENVIRONMENT_PATTERN = f"^{_DOTTED}(:{_DOTTED})?$"
+
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 """Robots, tasks and missions: 1 to 64 of A-Z a-z 0-9 _ -, because they become chunks of keys."""
 
+#: Longest time a mission may name, in seconds (thirty years): sums of a few such times stay finite and exact.
+LONGEST = 1e9
+Duration = Annotated[Positive, Field(le=LONGEST)]
+Instant = Annotated[NotNegative, Field(le=LONGEST)]
 
-def misplaced(path: Sequence[str | int], message: str) -> PydanticCustomError:
-    """An error that a validator of the whole mission found at the place `path` of the file."""
-    return PydanticCustomError("misplaced", "{message}", {"message": message, "path": list(path)})
+
+def misplaced(path: Sequence[str | int], message: str, errors: Sequence[ErrorDetails] = ()) -> PydanticCustomError:
+    """An error that a validator of the whole mission found at the place `path` of the file.
+
+    Args:
+        path: fields, names and indices from the top of the file.
+        message: what is wrong there.
+        errors: the errors of a record that was checked there on its own, with places counted from `path`; where they
+            are given, they say more than `message`.
+    """
+    return PydanticCustomError("misplaced", "{message}", {"message": message, "path": list(path), "errors": errors})
+
+
+_EMPTY_MEANS_DEFAULTS = GetPydanticSchema(
+    lambda record, handler: core_schema.no_info_after_validator_function(
+        lambda value: record() if value is None else value, core_schema.nullable_schema(handler(record))
+    )
+)
 
 
 class EnvironmentChoice(Record):
@@ -30,7 +57,7 @@ class EnvironmentChoice(Record):
 
     model_config = ConfigDict(extra="allow")
 
-    kind: str = "task_pool"
+    kind: Annotated[str, Field(pattern=ENVIRONMENT_PATTERN)] = "task_pool"
     """`task_pool`, `box_pushing`, or `package.module:Class` for an environment of one's own."""
 
     @property
@@ -44,21 +71,21 @@ class TaskSpec(Record):
 
     after: tuple[Name, ...] = ()
     """Tasks that must be complete before this one can be worked on."""
-    arrives: NotNegative = 0.0
+    arrives: Instant = 0.0
     """When the task comes into being, in seconds after the trial's start."""
 
 
 class RobotSpec(Record):
     """One robot of the team."""
 
-    tasks: Annotated[dict[Name, Positive], Field(min_length=1)]
+    tasks: Annotated[dict[Name, Duration], Field(min_length=1)]
     """The tasks it can do, each with the time it needs alone, in seconds."""
-    joins: NotNegative = 0.0
+    joins: Instant = 0.0
     """When its process is started, in seconds after the live trial's start; 0: from the beginning."""
-    behaviors: Annotated[str, Field(pattern=r"^[\w.]+:[\w.]+$")] | None = None
+    behaviors: Annotated[str, Field(pattern=FACTORY_PATTERN)] | None = None
     """`package.module:factory` of behaviour sets of one's own; the default lets the world's body do the work."""
-    parameters: dict[str, Any] = {}
-    """Parameters in which this robot differs from the team."""
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    """Parameters in which this robot differs from the team, spelled as in a mission file."""
 
 
 class Phase(Record):
@@ -69,7 +96,15 @@ class Phase(Record):
     trials: Annotated[int, Field(ge=1, le=10_000)] = 1
     """How often the mission is repeated."""
     until: Literal["full"] | None = None
-    """`full`: ends before `trials` are over as soon as every robot's monitors are full."""
+    """`full`: ends before `trials` are over as soon as every robot's monitors are full; only for active learning."""
+
+    @model_validator(mode="after")
+    def _check_until(self) -> Self:
+        if self.until and self.learning is not Learning.ACTIVE:
+            raise ValueError(
+                f"until: full needs learning: active, robots that are {self.learning} need not try all tasks"
+            )
+        return self
 
 
 class CrashFault(Record):
@@ -79,11 +114,11 @@ class CrashFault(Record):
     """`crash`."""
     robot: Name
     """Whose process."""
-    at: NotNegative
+    at: Instant
     """When, in seconds after the live trial's start."""
     restart: bool = False
     """Whether the process is started again, with a new incarnation and the learned times it had stored."""
-    until: Positive | None = None
+    until: Duration | None = None
     """When it is started again; default: 5 seconds after `at`."""
 
     @property
@@ -109,8 +144,8 @@ class Mission(Record):
     """The mission's name; it is the first chunk of all its keys."""
     environment: EnvironmentChoice = EnvironmentChoice()
     """What the tasks are made of."""
-    tasks: Annotated[dict[Name, TaskSpec], Field(min_length=1)]
-    """The tasks, in the order that breaks ties."""
+    tasks: Annotated[dict[Name, Annotated[TaskSpec, _EMPTY_MEANS_DEFAULTS]], Field(min_length=1)]
+    """The tasks, in the order that breaks ties; nothing after a task's name means its defaults."""
     robots: Annotated[dict[Name, RobotSpec], Field(min_length=1)]
     """The team."""
     parameters: Parameters = Parameters()
@@ -121,26 +156,22 @@ class Mission(Record):
     """Faults of the live trial."""
     knowledge: Literal["none", "given"] = "none"
     """What robots know before the first trial: nothing, or the true times of all who share their tasks."""
-    control_period: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.1
+    control_period: Annotated[float, Field(ge=0.001, le=10, allow_inf_nan=False)] = 0.1
     """Time between two control steps of a robot, in seconds."""
-    deadline: Positive = 600.0
+    deadline: Duration = 600.0
     """A trial that is not complete after this many seconds has failed."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """All randomness of a run comes from this number."""
-
-    @field_validator("tasks", mode="before")
-    @classmethod
-    def _empty_task_means_defaults(cls, value: object) -> object:
-        if isinstance(value, Mapping):
-            return {name: {} if task is None else task for name, task in value.items()}
-        return value
 
     @model_validator(mode="after")
     def _check_together(self) -> Self:
         self._check_tasks()
         self._check_abilities()
+        self._check_instants()
         self._check_rates()
+        self._check_by_hand()
         self._check_faults()
+        self._check_live_trial()
         return self
 
     def _check_tasks(self) -> None:
@@ -149,14 +180,16 @@ class Mission(Record):
                 if needed not in self.tasks:
                     raise misplaced(
                         ("tasks", name, "after", index),
-                        f"{needed!r} is not a task of this mission{_like(needed, self.tasks)}",
+                        f"{needed!r} is not a task of this mission{like(needed, self.tasks)}",
                     )
+                if needed in task.after[:index]:
+                    raise misplaced(("tasks", name, "after", index), f"{needed!r} is listed twice; expected it once")
         try:
             TopologicalSorter({name: task.after for name, task in self.tasks.items()}).prepare()
         except CycleError as error:
-            circle = " after ".join(error.args[1])
+            circle = error.args[1][::-1]
             raise misplaced(
-                ("tasks", error.args[1][0], "after"), f"the prerequisites form a circle: {circle}"
+                ("tasks", circle[0], "after"), f"the prerequisites form a circle: {' after '.join(circle)}"
             ) from None
 
     def _check_abilities(self) -> None:
@@ -165,11 +198,23 @@ class Mission(Record):
                 if task not in self.tasks:
                     raise misplaced(
                         ("robots", name, "tasks", task),
-                        f"{task!r} is not a task of this mission{_like(task, self.tasks)}",
+                        f"{task!r} is not a task of this mission{like(task, self.tasks)}",
                     )
         for task in self.tasks:
             if not self.able(task):
                 raise misplaced(("tasks", task), "no robot can do this task; expected at least one robot that lists it")
+
+    def _check_instants(self) -> None:
+        for name, task in self.tasks.items():
+            self._check_before_deadline(task.arrives, ("tasks", name, "arrives"))
+        for name, robot in self.robots.items():
+            self._check_before_deadline(robot.joins, ("robots", name, "joins"))
+
+    def _check_before_deadline(self, instant: float, path: tuple[str | int, ...]) -> None:
+        if instant >= self.deadline:
+            raise misplaced(
+                path, f"{instant:g} s is not before the mission's deadline; expected less than {self.deadline:g} s"
+            )
 
     def _check_rates(self) -> None:
         for name in self.robots:
@@ -193,17 +238,48 @@ class Mission(Record):
         own = self.robots[robot].parameters
         return ("robots", robot, "parameters", field) if field in own else ("parameters", field)
 
+    def _check_by_hand(self) -> None:
+        for name in self.robots:
+            for task in self.parameters_of(name).by_hand_tasks:
+                if task not in self.tasks:
+                    raise misplaced(
+                        (*self._where(name, "by_hand_tasks"), task),
+                        f"{task!r} is not a task of this mission{like(task, self.tasks)}",
+                    )
+
     def _check_faults(self) -> None:
         for index, fault in enumerate(self.faults):
             if fault.robot not in self.robots:
                 raise misplaced(
                     ("faults", index, "robot"),
-                    f"{fault.robot!r} is not a robot of this mission{_like(fault.robot, self.robots)}",
+                    f"{fault.robot!r} is not a robot of this mission{like(fault.robot, self.robots)}",
                 )
-            if fault.at >= self.deadline:
+            self._check_before_deadline(fault.at, ("faults", index, "at"))
+            self._check_before_deadline(fault.until or 0.0, ("faults", index, "until"))
+        down = dict.fromkeys(self.robots, -inf)
+        for index, fault in sorted(enumerate(self.faults), key=lambda numbered: numbered[1].at):
+            joins = self.robots[fault.robot].joins
+            if fault.at < joins:
                 raise misplaced(
-                    ("faults", index, "at"), f"{fault.at:g} s is not before the mission's deadline, {self.deadline:g} s"
+                    ("faults", index, "at"),
+                    f"at {fault.at:g} s robot {fault.robot} is not there; expected not before it joins, {joins:g} s",
                 )
+            if fault.at <= down[fault.robot]:
+                raise misplaced(
+                    ("faults", index, "at"),
+                    f"at {fault.at:g} s robot {fault.robot} is down from an earlier fault; expected "
+                    + ("no further fault of it" if down[fault.robot] == inf else f"more than {down[fault.robot]:g} s"),
+                )
+            down[fault.robot] = inf if fault.restart_at is None else fault.restart_at
+
+    def _check_live_trial(self) -> None:
+        planned = self.faults or any(robot.joins > 0 for robot in self.robots.values())
+        if planned and self.live.until and self.live.trials > 1:
+            raise misplaced(
+                ("phases", len(self.phases) - 1, "until"),
+                "faults and joins belong to the last trial, and until: full leaves open which one that is; "
+                "expected a further phase after this one",
+            )
 
     def able(self, task: str) -> list[str]:
         """The robots that can do `task`, in the mission's order."""
@@ -225,18 +301,12 @@ class Mission(Record):
     def _override(self, robot: str, changes: dict[str, Any]) -> Parameters:
         if not changes:
             return self.parameters
-        base = self.parameters.model_dump(exclude_unset=True)
+        base = self.parameters.model_dump(mode="json", exclude_unset=True)
         try:
-            return Parameters.model_validate({**base, **changes})
+            return Parameters.model_validate_json(to_json({**base, **changes}), strict=True)
         except ValidationError as error:
-            first = error.errors()[0]
-            path = ("robots", robot, "parameters", *first["loc"])
-            message = first["msg"].removeprefix("Value error, ")
-            if first["type"] == "extra_forbidden":
-                message = (
-                    f"unknown parameter {first['loc'][-1]!r}{_like(str(first['loc'][-1]), Parameters.model_fields)}"
-                )
-            raise misplaced(path, message) from None
+            found: list[ErrorDetails] = json.loads(error.json(include_url=False))
+            raise misplaced(("robots", robot, "parameters"), found[0]["msg"], found) from None
 
     @property
     def live(self) -> Phase:
@@ -268,9 +338,7 @@ class Mission(Record):
         return [task for task in self.robots[fault.robot].tasks if self.able(task) == [fault.robot]]
 
 
-def _like(word: str, known: Mapping[str, object]) -> str:
+def like(word: str, known: Iterable[str]) -> str:
     """`; did you mean …?` if one of `known` is spelled much like `word`, else nothing."""
-    from difflib import get_close_matches
-
     close = get_close_matches(word, known, n=1, cutoff=0.6)
     return f"; did you mean {close[0]!r}?" if close else ""

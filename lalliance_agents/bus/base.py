@@ -1,10 +1,14 @@
 """The bus as the rest of the project sees it: publish and subscribe, query and reply, presence.
 
 Every handler is called in the event loop of the task that registered it, one sample at a time, in the order in which a
-publisher sent; never from another thread. A handler must not block; what it raises is logged and counts as its own
-failure, never the bus's. Delivery is best effort on every bus: what is published while the bus is down is lost, without
-an error, and a flood drops the oldest samples first. Patterns are key expressions: `*` is one chunk, `**` any number of
-chunks, and a chunk that starts with `@` is matched by neither.
+publisher sent (what was sent with different `Delivery` may overtake); never from another thread, never inside `put`. A
+participant hears itself. A handler must not block; what it raises is logged and counts as its own failure, never the
+bus's. Delivery is best effort on every bus: what is published while the bus is down is lost, without an error, and a
+flood drops the oldest samples first. Patterns are key expressions: `*` is one chunk, `**` any number of chunks, and a
+chunk that starts with `@` is matched by neither.
+
+A key or pattern that is not one, or is too long, raises `ValueError` wherever it is given. After `close`, what is
+published is ignored and queries have no answers, while a new declaration is a mistake: `RuntimeError`.
 """
 
 from collections.abc import Callable
@@ -20,6 +24,10 @@ class Sample:
 
     key: str
     payload: bytes
+
+
+#: Larger payloads, in bytes, are dropped and counted by whoever receives them.
+MAX_PAYLOAD = 64 * 1024
 
 
 class Delivery(StrEnum):
@@ -66,7 +74,10 @@ class Bus(Protocol):
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
 
     async def answer(self, pattern: str, handler: Answer) -> Registration:
-        """Answer queries that match `pattern` with the samples that `handler` returns for the query's key and payload."""
+        """Answer queries that match `pattern` with the samples that `handler` returns for the query's pattern and payload.
+
+        An answer's key must be matched by the query's pattern; if one is not, the query gets no answer from here.
+        """
 
     async def query(self, pattern: str, payload: bytes = b"", *, timeout: float) -> list[Sample]:  # noqa: ASYNC109 - the bus's own limit, not a cancellation
         """Ask whoever answers `pattern`; all answers that came within `timeout` seconds, possibly none."""
@@ -75,7 +86,10 @@ class Bus(Protocol):
         """Be present as `key` until closed or gone, however abruptly."""
 
     async def watch_presence(self, pattern: str, handler: PresenceHandler) -> Registration:
-        """Have `handler` called with (key, True) for each presence there is or comes, and (key, False) when it is gone."""
+        """Have `handler` called with (key, True) for each presence there is or comes, and (key, False) when it is gone.
+
+        Several announcements of one key are one presence, gone with the last. While the bus is down, all are gone.
+        """
 
     async def close(self) -> None:
         """Leave the bus; a second call does nothing."""

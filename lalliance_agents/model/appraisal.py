@@ -209,7 +209,7 @@ class Appraisal:
             return 1
         return equations.impatience_reset(
             any(
-                self._hearing.first_heard_within(contact, moment.before, moment.now)
+                self._hearing.is_news(contact, moment.before, moment.now)
                 for contact in self._hearing.contacts(one.task)
             )
         )

@@ -29,6 +29,8 @@ class Contact:
     """What the teammate announced as its own expected time, in seconds."""
     lapsed_at: float | None = None
     """When it was noticed that the teammate is not heard on the task any more."""
+    noticed: bool = False
+    """Whether a step has counted the first message."""
 
 
 class Hearing:
@@ -67,6 +69,7 @@ class Hearing:
         if fresh:
             contact.since = now
             contact.started = now - active_for
+            contact.noticed = contact.noticed and not self._per_attempt
         contact.last = now
         contact.expected = expected
         contact.lapsed_at = None
@@ -84,6 +87,10 @@ class Hearing:
         """The teammates heard within tau; the robot itself is not among them (erratum 3 adds it)."""
         return [robot for robot in self._last if self.is_present(robot, now)]
 
+    def silences(self, now: float) -> dict[str, float]:
+        """How long ago each teammate was last heard, in seconds."""
+        return {robot: max(now - last, 0.0) for robot, last in self._last.items()}
+
     def contacts(self, task: str) -> Iterator[Contact]:
         """All teammates heard on `task` in this trial."""
         return iter(self._contacts.get(task, {}).values())
@@ -100,9 +107,21 @@ class Hearing:
         """comm_received(i, k, j, 0, instant)."""
         return in_window(self._beginning(contact), -math.inf, instant, self._closed)
 
-    def first_heard_within(self, contact: Contact, after: float, until: float) -> bool:
-        """comm_received in (after, until], and not in (0, after]."""
-        return in_window(self._beginning(contact), after, until, self._closed)
+    def is_news(self, contact: Contact, before: float, now: float) -> bool:
+        """comm_received in (before, now], and not in (0, before]: first heard since the last communication check.
+
+        A message can come at the very instant of a check, but after it. So that it is counted once all the same, each
+        check marks what it has counted (`note_checked`); the literal reading goes by instants alone and misses it.
+        """
+        if self._closed:
+            return not contact.noticed
+        return in_window(self._beginning(contact), before, now, closed=False)
+
+    def note_checked(self) -> None:
+        """All that was heard so far has been counted: it is no news to the next step."""
+        for contacts in self._contacts.values():
+            for contact in contacts.values():
+                contact.noticed = True
 
     def _beginning(self, contact: Contact) -> float:
         return contact.since if self._per_attempt else contact.first

@@ -6,6 +6,7 @@ that is decided carries the factors behind it. Sets are suppressed by the set th
 that stops one task begins to want another from the next tick on.
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 from lalliance_agents.model import equations
@@ -87,12 +88,12 @@ class Mind:
         self._born = now
         self._waiting = self._beats
         self._idle_since = now
-        self.hearing.forget()
         for one in self._sets.values():
             if one.active:
                 self._pending.append(Deactivate(self._stop(one, now, Cause.NEW_TRIAL, None)))
             self._sets[one.task] = Motivation(one.task, self._draw(), since=now)
             self.knowledge.monitors[one.task].new_trial()
+        self.hearing.forget()
 
     @property
     def active(self) -> list[str]:
@@ -128,6 +129,8 @@ class Mind:
                 monitor.elsewhere(event.robot, now)
         if event.task is None or event.task not in self._sets:
             return
+        if not 0.0 <= event.active_for < math.inf:
+            return  # no attempt can be so long; the teammate is there, and nothing more is known
         workable = self._sets[event.task].sensory_feedback == 1
         monitor = self.knowledge.monitors[event.task]
         fresh = workable and monitor.observe(event.robot, now, event.active_for)
@@ -161,6 +164,7 @@ class Mind:
             else:
                 self._grow(one, factors, moment)
         activations = self._activate(now)
+        self.hearing.note_checked()
         return commands + activations + self._announce(now, before, urgent=bool(activations))
 
     def _moment(self, now: float, before: float, working: list[str]) -> Moment:

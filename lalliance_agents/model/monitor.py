@@ -5,9 +5,9 @@ teammates, known through their messages. A task's completion turns the attempt t
 which are kept per robot; an attempt that ended otherwise leaves a lower bound (erratum 13). Only an attempt that was the
 task's first in its trial is a sample, since a second robot finds the work half done (erratum 14).
 
-An attempt is identified by how long its robot says it has been active: when that falls, a new attempt has begun. A
-teammate heard elsewhere has left; one that falls silent may still be working and is not judged before the task is
-complete or the teammate is heard again.
+An attempt is identified by how long its robot says it has been active: when that falls, or says that the robot began
+more than tau after it was last heard, a new attempt has begun. A teammate heard elsewhere has left; one that falls silent
+may still be working and is not judged before the task is complete or the teammate is heard again.
 """
 
 from collections import deque
@@ -45,8 +45,8 @@ class _Performance:
 
     def __init__(self, trials: int, record: Record) -> None:
         self.samples: deque[float] = deque(record.samples, maxlen=trials)
-        self.floor = record.floor
-        self.floor_left = record.floor_left
+        self.floor_left = min(record.floor_left, trials)
+        self.floor = record.floor if self.floor_left > 0 else 0.0
         self.time: float | None = None
         self.refresh()
 
@@ -85,13 +85,18 @@ class Monitor:
     def observe(self, robot: str, now: float, active_for: float) -> bool:
         """`robot` is on the task since `active_for` seconds; whether this is a new attempt of it."""
         attempt = self._attempts.get(robot)
-        if attempt is not None and active_for >= attempt.active_for - SLACK:
+        if attempt is not None and self._goes_on(attempt, now, active_for):
             attempt.last, attempt.active_for, attempt.left = now, active_for, None
             return False
         if attempt is not None:
             self._fail(robot, attempt)
         self._attempts[robot] = _Attempt(now - active_for, now, active_for)
         return True
+
+    def _goes_on(self, attempt: _Attempt, now: float, active_for: float) -> bool:
+        """Whether a message belongs to `attempt`: not one begun after it, and not one begun while nothing was heard."""
+        begun_later = more_than(now - active_for, attempt.last + self._tau)
+        return active_for >= attempt.active_for - SLACK and not begun_later
 
     def elsewhere(self, robot: str, now: float) -> None:
         """`robot` was heard idle or on another task: it has left this one, or the task is complete."""

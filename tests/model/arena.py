@@ -1,7 +1,8 @@
 """A toy world for the model's tests: minds on a common clock, messages without delay, work that just takes its time.
 
 It has no bus and no environment, so that what a test sees here is the model's doing alone. All minds tick together, in
-order; what one announces the others hear before the next step.
+order; what one announces the others hear before the next step. Beside the minds there may be ghosts: teammates that only
+say what a test has them say, just before the minds tick.
 """
 
 import random
@@ -22,6 +23,20 @@ from lalliance_agents.model.mind import Mind
 from lalliance_agents.model.monitor import Record
 from lalliance_agents.model.parameters import Learning, Parameters
 
+Ghost = Callable[[float], Announce | None]
+
+
+def ghost(*attempts: tuple[str, float, float], idle: bool = True, expected: float = 99.0) -> Ghost:
+    """A teammate that says to be on each task from one instant to another, and is idle, or silent, in between."""
+
+    def speak(now: float) -> Announce | None:
+        for task, since, until in attempts:
+            if since - 1e-9 <= now < until - 1e-9:
+                return Announce(task, max(now - since, 0.0), expected)
+        return Announce(None) if idle else None
+
+    return speak
+
 
 @dataclass
 class Arena:
@@ -32,17 +47,23 @@ class Arena:
         parameters: of every robot.
         period: the control period, in seconds.
         given: whether robots know all the times they share from the start.
+        known: task -> robot -> the time that all robots know from the start, in seconds.
+        ghosts: teammates that are no minds, each with what it says at an instant.
         dead_after: robot -> instant from which it neither works nor sends nor hears.
         stuck: (robot, task) pairs that never progress.
+        restarts: whether each attempt begins its task anew; otherwise the work left belongs to the task.
     """
 
     abilities: Mapping[str, Mapping[str, float]]
     parameters: Parameters = field(default_factory=Parameters)
     period: float = 0.1
     given: bool = False
+    known: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    ghosts: Mapping[str, Ghost] = field(default_factory=dict)
     learning: Learning = Learning.ADAPTIVE
     dead_after: Mapping[str, float] = field(default_factory=dict)
     stuck: frozenset[tuple[str, str]] = frozenset()
+    restarts: bool = False
     seed: int = 0
     deliver: Callable[[str, str, float], bool] = lambda sender, receiver, now: True
 
@@ -62,21 +83,23 @@ class Arena:
             mates = {
                 k for k, tasks in self.abilities.items() if k != robot and tasks.keys() & self.abilities[robot].keys()
             }
-            mind.handle(RosterKnown(frozenset(mates)), 0.0)
-            if self.given:
-                known = {
-                    task: {k: Record((own[task],)) for k, own in self.abilities.items() if task in own}
-                    for task in self.tasks
-                }
-                mind.knowledge.restore(known)
+            mind.handle(RosterKnown(frozenset(mates | self.ghosts.keys())), 0.0)
+            mind.knowledge.restore(self._learned())
         self.now = 0.0
         self.log: list[tuple[float, str, Decision]] = []
         self.completed: dict[str, tuple[float, str]] = {}
         self.begin(self.learning)
 
+    def _learned(self) -> dict[str, dict[str, Record]]:
+        if not self.given:
+            return {task: {k: Record((time,)) for k, time in times.items()} for task, times in self.known.items()}
+        return {
+            task: {k: Record((own[task],)) for k, own in self.abilities.items() if task in own} for task in self.tasks
+        }
+
     def begin(self, learning: Learning) -> None:
         """Start a trial: all work is to be done, at once."""
-        self.left = dict.fromkeys(self.tasks, 1.0)
+        self.left: dict[tuple[str, str], float] = {}
         self.completed = {}
         self.started = self.now
         for mind in self.minds.values():
@@ -91,14 +114,13 @@ class Arena:
         """Let one control period pass: work, sensing, then every living mind ticks and is heard."""
         self.now = round(self.now + self.period, 9)
         for robot, mind in self.minds.items():
-            for task in mind.active if self.alive(robot) else []:
-                if (robot, task) not in self.stuck:
-                    self.left[task] -= self.period / self.abilities[robot][task]
-                    if self.left[task] <= 1e-9 and task not in self.completed:
-                        self.completed[task] = (self.now, robot)
+            self._work(robot, mind.active if self.alive(robot) else [])
         for mind in self.minds.values():
             for task in self.completed:
                 mind.handle(Sensed(task, applicable=False, complete=True), self.now)
+        for robot, speak in self.ghosts.items():
+            if said := speak(self.now):
+                self._broadcast(robot, said)
         heard = []
         for robot, mind in self.minds.items():
             if self.alive(robot):
@@ -110,11 +132,27 @@ class Arena:
         for sender, command in heard:
             self._broadcast(sender, command)
 
+    def _work(self, robot: str, active: list[str]) -> None:
+        for task in self.tasks:
+            work = (robot if self.restarts else "team", task)
+            if task in active and (robot, task) not in self.stuck:
+                self.left[work] = self.left.get(work, 1.0) - self.period / self.abilities[robot][task]
+                if self.left[work] <= 1e-9:
+                    self.completed.setdefault(task, (self.now, robot))
+            elif task not in active and self.restarts:
+                self.left.pop(work, None)
+
     def _broadcast(self, sender: str, command: Announce) -> None:
         for receiver, mind in self.minds.items():
             shares = command.task is None or command.task in self.abilities[receiver]
             if receiver != sender and self.alive(receiver) and shares and self.deliver(sender, receiver, self.now):
                 mind.handle(Heard(sender, command.task, command.active_for, command.expected), self.now)
+
+    def go(self, until: float) -> list[str]:
+        """Step until `until`; the log of all that was decided."""
+        while self.now < until - 1e-9:
+            self.step()
+        return self.told()
 
     def run(self, until: float) -> float:
         """Steps until all tasks are complete or `until`; the makespan, or infinity."""

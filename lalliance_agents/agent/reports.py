@@ -1,0 +1,57 @@
+"""What a robot tells of itself to whoever looks: what it received, whether it kept its pace, what it is motivated to do."""
+
+from collections import Counter
+
+from lalliance_agents.agent import translate
+from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.model.mind import Mind
+from lalliance_agents.wire.keys import Kind
+from lalliance_agents.wire.messages import Reception
+
+
+class Reports:
+    """Counters of one robot, and the messages that carry them.
+
+    Args:
+        messenger: what is counted, and what carries the reports.
+    """
+
+    def __init__(self, messenger: Messenger) -> None:
+        self._messenger = messenger
+        self._received: Counter[str] = Counter()
+        self._ticks = 0
+        self._missed = 0
+
+    def begin(self) -> None:
+        """The mission begins: control periods count from here."""
+        self._ticks = self._missed = 0
+
+    def heard(self, teammate: str) -> None:
+        """A presence message of `teammate` was used."""
+        self._received[teammate] += 1
+
+    def ticked(self, missed: int) -> None:
+        """A control step was made after `missed` periods without one."""
+        self._ticks += 1
+        self._missed += missed
+
+    def send(self, mind: Mind, now: float, *, final: bool) -> None:
+        """Publish what came and went so far."""
+        silences = mind.hearing.silences(now)
+        self._messenger.send(
+            Kind.LINK,
+            sent=self._messenger.sent,
+            received=self._messenger.received,
+            dropped=dict(self._messenger.dropped),
+            teammates={
+                robot: Reception(received=count, silence=silences.get(robot)) for robot, count in self._received.items()
+            },
+            ticks=self._ticks,
+            missed=self._missed,
+            final=final,
+        )
+
+    def motivations(self, mind: Mind) -> bytes:
+        """The packed message with all motivations and their factors."""
+        sets = {task: translate.scalars(factors) for task, factors in mind.factors().items()}
+        return self._messenger.compose(Kind.MOTIVATION, active=mind.active, sets=sets)

@@ -1,0 +1,320 @@
+"""The robot at run time: receive, feed, tick, perform.
+
+A `Robot` puts a mind, a messenger and a body together in one event loop. Messages become events; once per control period
+the mind ticks, and its commands go to the radio and the body. Once a second the robot refreshes what others keep of it. It
+decides nothing itself, and nothing that it receives can end it: it ends when the world says that the mission is over, or
+when it is cancelled.
+"""
+
+import asyncio
+import logging
+import random
+from collections.abc import Iterable
+from typing import Any, Literal
+
+from lalliance_agents.agent import translate
+from lalliance_agents.agent.behavior import BehaviorSet, complete_repertoire
+from lalliance_agents.agent.catalog import Catalog, fresh_incarnation
+from lalliance_agents.agent.performer import Performer
+from lalliance_agents.agent.reports import Reports
+from lalliance_agents.agent.team import Team
+from lalliance_agents.bus.base import Bus, Delivery, Publication, Sample
+from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.clock import MissionClock
+from lalliance_agents.config import Mission
+from lalliance_agents.errors import MissionError
+from lalliance_agents.model.events import Activate, Announce, BodyFailed, Command, Deactivate, RosterKnown, TrialStarted
+from lalliance_agents.model.mind import Mind
+from lalliance_agents.model.monitor import Record
+from lalliance_agents.wire.keys import Key, Keys, Kind
+from lalliance_agents.wire.messages import Activity, BodyState, Heartbeat, Hello, Message, TaskState
+
+_log = logging.getLogger(__name__)
+
+#: How long the robot waits at its start for the answers of the world and of teammates, in real seconds.
+GREETING_TIMEOUT = 1.0
+#: Robots listened to at most: hostile names cannot fill the memory.
+MOST_TEAMMATES = 1024
+#: Time between two refreshes of the action and the report, and of the rarer greeting, in mission seconds.
+REFRESH_PERIOD = 1.0
+GREETING_PERIOD = 10.0
+#: Least time between two messages with all motivations, in mission seconds.
+MOTIVATION_PERIOD = 0.2
+
+Outcome = Literal["complete", "failed"]
+
+
+class Robot:
+    """One robot of a team.
+
+    Args:
+        mission: the mission, with this robot in it.
+        name: which robot of the mission.
+        bus: an open bus; the robot does not close it.
+        behaviors: behaviour sets of its own; tasks without one are done by the body in the world server.
+        clock: mission time; default: real time from now on.
+        catalog: learned times on disk; default: nothing is stored.
+        incarnation: which life of this robot this is; default: what the catalog says, else a fresh one.
+        world: whether there is a world server; without one the robot begins at once and never ends by itself.
+
+    Raises:
+        BehaviorError: the behaviour sets do not fit the mission.
+        MissionError: the mission has no robot of this name.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        name: str,
+        *,
+        bus: Bus,
+        behaviors: Iterable[BehaviorSet] = (),
+        clock: MissionClock | None = None,
+        catalog: Catalog | None = None,
+        incarnation: int | None = None,
+        world: bool = True,
+    ) -> None:
+        if name not in mission.robots:
+            raise MissionError(
+                f"mission {mission.name} has no robot {name!r}; expected one of {', '.join(mission.robots)}"
+            )
+        self.name = name
+        self._mission = mission
+        self._world = world
+        self._bus = bus
+        self._clock = clock or MissionClock()
+        self._catalog = catalog
+        if incarnation is None:
+            incarnation = catalog.incarnation if catalog else fresh_incarnation()
+        tasks = [task for task in mission.tasks if task in mission.robots[name].tasks]
+        self._repertoire = complete_repertoire(name, tasks, behaviors)
+        self._random = random.Random(f"{mission.seed}/{name}/{incarnation}")
+        now = self._clock.now()
+        self.mind = Mind(name, tasks, mission.parameters_of(name), now=now, draw=self._random.random)
+        self._restore()
+        self._keys = Keys(mission.name)
+        self._messenger = Messenger(bus, self._keys, name, incarnation, self._clock.now)
+        self._reports = Reports(self._messenger)
+        self._team = Team(name, frozenset(tasks), MOST_TEAMMATES)
+        self._performer = Performer(self._body_failed, self._body_returned)
+        self._motivations: Publication | None = None
+        self._trial = 0 if world else 1
+        self._told: dict[str, tuple[bool, bool]] = {}
+        self._broken: set[str] = set()
+        self._saved_version = self._version()
+        self._saving: asyncio.Task[None] | None = None
+        self._refresh_due = self._greeting_due = self._motivation_due = now
+        self._over: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
+        self._listening: set[asyncio.Task[None]] = set()
+
+    def __repr__(self) -> str:
+        return f"<Robot {self.name}: {self._performer.task or 'idle'}, trial {self._trial}>"
+
+    async def run(self) -> Outcome:
+        """Be part of the team until the mission is over; how it ended."""
+        presence = None
+        ticking = None
+        try:
+            await self._join()
+            presence = await self._bus.announce_presence(self._keys.build(Kind.ALIVE, robot=self.name))
+            ticking = asyncio.create_task(self._tick_forever(), name=f"ticks of {self.name}")
+            ends: set[asyncio.Future[Any]] = {ticking, self._over}
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+            if ticking.done():
+                ticking.result()
+            return self._over.result()
+        finally:
+            await self._leave(ticking)
+            if presence is not None:
+                await presence.close()
+
+    async def _join(self) -> None:
+        keys, listen = self._keys, self._messenger.listen
+        for task in self._repertoire:
+            await listen(keys.build(Kind.ACTIVITY, task=task), self._receive_presence)
+            await listen(keys.build(Kind.SENSE_TASK, task=task), self._receive_sense)
+        await listen(keys.build(Kind.SENSE_ROBOT, robot=self.name), self._receive_body)
+        await listen(keys.build(Kind.HELLO), self._receive_hello)
+        await self._messenger.offer(keys.build(Kind.HELLO, robot=self.name), self._own_hello)
+        self._motivations = await self._bus.publication(
+            keys.build(Kind.MOTIVATION, robot=self.name), Delivery.TELEMETRY
+        )
+        for teammate in self._mission.teammates(self.name):
+            await self._listen_to(teammate, frozenset(self._mission.robots[teammate].tasks))
+        expected = frozenset(k for k in self._mission.teammates(self.name) if self._mission.robots[k].joins == 0.0)
+        self.mind.handle(RosterKnown(expected), self._clock.now())
+        self._greet()
+        await asyncio.gather(
+            self._messenger.ask(keys.build(Kind.HELLO), self._receive_hello, timeout=GREETING_TIMEOUT),
+            self._messenger.ask(keys.build(Kind.SENSE_TASK), self._receive_sense, timeout=GREETING_TIMEOUT),
+            self._messenger.ask(
+                keys.build(Kind.SENSE_ROBOT, robot=self.name), self._receive_body, timeout=GREETING_TIMEOUT
+            ),
+        )
+
+    async def _leave(self, ticking: asyncio.Task[None] | None) -> None:
+        if ticking is not None:
+            ticking.cancel()
+            await asyncio.wait({ticking})
+        for task in self._listening:
+            task.cancel()
+        await self._performer.close()
+        self._reports.send(self.mind, self._clock.now(), final=True)
+        await self._messenger.close()
+        if self._motivations is not None:
+            await self._motivations.close()
+        if self._saving is not None:
+            await asyncio.wait({self._saving})
+        await self._save()
+
+    def _receive_presence(self, _: Key, message: Message) -> None:
+        if not isinstance(message, Activity | Heartbeat):
+            return
+        if not self._team.knows(message.sender):
+            self._messenger.drop("stranger", message.sender)
+        elif message.trial != self._trial:
+            self._messenger.drop("other trial", message.sender)
+        else:
+            self._reports.heard(message.sender)
+            self.mind.handle(translate.heard(message), self._clock.now())
+
+    def _receive_sense(self, key: Key, message: Message) -> None:
+        if isinstance(message, TaskState) and key.task in self._repertoire and message.trial >= self._trial:
+            self._enter_trial(message.trial, message.learning)
+            self._repertoire[key.task].sensed = translate.sense(message)
+            self._feel(self._repertoire[key.task])
+
+    def _receive_body(self, _: Key, message: Message) -> None:
+        if not isinstance(message, BodyState) or message.trial < self._trial:
+            return
+        if message.mission in {"complete", "failed"} and not self._over.done():
+            self._over.set_result("complete" if message.mission == "complete" else "failed")
+        elif message.mission == "running":
+            self._enter_trial(message.trial, message.learning)
+
+    def _receive_hello(self, _: Key, message: Message) -> None:
+        if isinstance(message, Hello):
+            shared = frozenset(message.tasks) & self._repertoire.keys()
+            if shared and not self._team.knows(message.sender) and not self._team.full:
+                listening = asyncio.create_task(self._listen_to(message.sender, frozenset(message.tasks)))
+                self._listening.add(listening)
+                listening.add_done_callback(self._listening.discard)
+
+    async def _listen_to(self, teammate: str, tasks: frozenset[str]) -> None:
+        self._team.meet(teammate, tasks)
+        await self._messenger.listen(self._keys.build(Kind.HEARTBEAT, robot=teammate), self._receive_presence)
+
+    def _enter_trial(self, trial: int, learning: str) -> None:
+        if trial <= self._trial:
+            return
+        if self._trial == 0:
+            self._reports.begin()
+        self._trial = trial
+        self._told.clear()
+        for one in self._repertoire.values():
+            one.sensed = None
+            one.returned = False
+        self.mind.handle(TrialStarted(translate.learning(learning)), self._clock.now())
+
+    def _feel(self, one: BehaviorSet) -> None:
+        """Ask a behaviour set how its task stands, and tell the mind if that has changed."""
+        try:
+            felt = bool(one.applicable()), bool(one.complete())
+        except Exception:
+            if one.task not in self._broken:
+                self._broken.add(one.task)
+                _log.exception("sensing of %r failed; taken as not applicable", one)
+            felt = False, False
+        if self._told.get(one.task) != felt:
+            self._told[one.task] = felt
+            self.mind.handle(translate.sensed(one.task, *felt), self._clock.now())
+
+    def _body_failed(self, one: BehaviorSet) -> None:
+        self.mind.handle(BodyFailed(one.task), self._clock.now())
+
+    def _body_returned(self, one: BehaviorSet) -> None:
+        self._feel(one)
+
+    async def _tick_forever(self) -> None:
+        period = self._mission.control_period
+        due = self._clock.now() + self._random.random() * period
+        while True:
+            await self._clock.sleep_until(due)
+            now = self._clock.now()
+            missed = max(int((now - due) / period), 0)
+            self._reports.ticked(missed)
+            self._tick(now)
+            due += (missed + 1) * period
+
+    def _tick(self, now: float) -> None:
+        if self._trial > 0:
+            for one in self._repertoire.values():
+                self._feel(one)
+        for command in self.mind.tick(now):
+            self._perform(command)
+        if now >= self._refresh_due:
+            self._refresh_due = now + REFRESH_PERIOD
+            self._refresh(now)
+        if now >= self._motivation_due and self._motivations is not None and self._motivations.has_listeners:
+            self._motivation_due = now + MOTIVATION_PERIOD
+            self._motivations.put(self._reports.motivations(self.mind))
+
+    def _perform(self, command: Command) -> None:
+        match command:
+            case Announce():
+                kind, fields = translate.announcement(command, self._trial)
+                self._messenger.send(kind, key_task=command.task or "", **fields)
+            case Activate():
+                self._performer.start(self._repertoire[command.decision.task])
+                self._act()
+                self._messenger.send(Kind.DECISION, **translate.decision(command.decision, self._trial))
+            case Deactivate():
+                self._performer.stop(command.decision.task)
+                self._act()
+                self._messenger.send(Kind.DECISION, **translate.decision(command.decision, self._trial))
+
+    def _act(self) -> None:
+        """Tell the world what the body works on."""
+        fewest = self.mind.knowledge.fewest(self._team.abilities)
+        self._messenger.send(Kind.ACTION, task=self._performer.task, trial=self._trial, fewest=fewest)
+
+    def _refresh(self, now: float) -> None:
+        self._act()
+        self._reports.send(self.mind, now, final=False)
+        if now >= self._greeting_due:
+            self._greeting_due = now + GREETING_PERIOD
+            self._greet()
+        if self._catalog is not None and self._version() != self._saved_version and self._saving is None:
+            self._saving = asyncio.create_task(self._save())
+            self._saving.add_done_callback(lambda _: setattr(self, "_saving", None))
+
+    def _greet(self) -> None:
+        self._messenger.send(Kind.HELLO, tasks=list(self._repertoire))
+
+    def _own_hello(self, _: str) -> list[Sample]:
+        key = self._keys.build(Kind.HELLO, robot=self.name)
+        return [Sample(key, self._messenger.compose(Kind.HELLO, tasks=list(self._repertoire)))]
+
+    def _restore(self) -> None:
+        learned: dict[str, dict[str, Record]] = {}
+        if self._mission.knowledge == "given":
+            for task in self._repertoire:
+                able = self._mission.able(task)
+                learned[task] = {robot: Record((self._mission.robots[robot].tasks[task],)) for robot in able}
+        if self._catalog is not None:
+            for task, records in self._catalog.learned.items():
+                learned.setdefault(task, {}).update(records)
+        self.mind.knowledge.restore(learned)
+
+    def _version(self) -> int:
+        return sum(monitor.version for monitor in self.mind.knowledge.monitors.values())
+
+    async def _save(self) -> None:
+        if self._catalog is None or self._version() == self._saved_version:
+            return
+        version, learned = self._version(), self.mind.knowledge.records()
+        try:
+            await asyncio.to_thread(self._catalog.save, learned)
+            self._saved_version = version
+        except OSError as error:
+            _log.warning("learned times not stored: %s", error)

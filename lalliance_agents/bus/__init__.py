@@ -1,0 +1,7 @@
+"""The edge of the robot: messages come in here and leave from here, and nothing else in the project knows how.
+
+`base` says what a bus can do. `zenoh_bus` does it over a network, through a router (`router` runs one inside a Python
+process); `memory` does it inside one event loop, for tests. Both hand what they receive to an `inbox`, so that order,
+limits and failing handlers are the same on either, and one conformance suite (`tests/bus`) holds them to it. `patterns`
+spells out which keys a key expression matches. What the payloads mean is not known in this room.
+"""

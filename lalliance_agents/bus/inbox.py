@@ -1,0 +1,220 @@
+"""What every bus does with what arrives: queue it, hand it to the loop in batches, call the handlers one by one.
+
+Anything may be pushed from any thread; handlers run only inside the event loop, in the order of the pushes, at most `BATCH`
+per turn of the loop, so that a flood cannot starve the other tasks. The queue is bounded: when it is full the oldest
+message is dropped and counted, but never an inlet's that must `keep` all (a presence lost would stay wrong for ever).
+What a handler raises is logged once per inlet and kind of exception. Nothing here knows which bus it serves.
+"""
+
+import asyncio
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from lalliance_agents.bus.base import MAX_PAYLOAD, Answer, Sample
+from lalliance_agents.bus.patterns import check_key, matches
+
+#: Messages handled in one turn of the loop.
+BATCH = 256
+#: Messages that may wait; beyond it the oldest are dropped. At the largest payload this is 256 MiB.
+CAPACITY = 4096
+
+Raw = TypeVar("Raw")
+
+_logger = logging.getLogger(__name__)
+
+
+class Inlet(Generic[Raw]):
+    """One registration's way from the inbox to its handler; `Raw` is a message as the bus at hand represents it.
+
+    Attributes:
+        is_open: false once the registration is taken back; messages still queued are then discarded.
+        keep: whether its messages survive a flood.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        accept: Callable[[Raw], object],
+        *,
+        discard: Callable[[Raw], object] | None = None,
+        keep: bool = False,
+    ) -> None:
+        self.is_open = True
+        self.keep = keep
+        self._name = name
+        self._accept = accept
+        self._discard = discard
+        self._reported: set[type[Exception]] = set()
+
+    def __repr__(self) -> str:
+        return f"<inlet {self._name}, {'open' if self.is_open else 'closed'}>"
+
+    def deliver(self, raw: Raw) -> None:
+        """Have the message handled; only in the loop."""
+        if not self.is_open:
+            self.discard(raw)
+            return
+        try:
+            self._accept(raw)
+        except Exception as error:  # a handler's failure is its own, never the bus's
+            self._report(error)
+
+    def discard(self, raw: Raw) -> None:
+        """Let go of a message that will not be handled; in any thread."""
+        if self._discard is not None:
+            self._discard(raw)
+
+    def _report(self, error: Exception) -> None:
+        if type(error) not in self._reported:
+            self._reported.add(type(error))
+            _logger.error(
+                "The handler of %s raised %s; the same again will not be logged.",
+                self._name,
+                type(error).__name__,
+                exc_info=error,
+            )
+
+
+class Inbox:
+    """The queue between whoever receives and the event loop.
+
+    Args:
+        wake: has a function called once in the loop: `loop.call_soon_threadsafe`, or `loop.call_soon` without threads.
+
+    Attributes:
+        dropped_overflow: messages dropped because the queue was full.
+        dropped_oversize: messages dropped because they were larger than `MAX_PAYLOAD`.
+    """
+
+    def __init__(self, wake: Callable[[Callable[[], None]], object]) -> None:
+        self.dropped_overflow = 0
+        self.dropped_oversize = 0
+        self._wake = wake
+        self._lock = threading.Lock()
+        self._waiting: deque[tuple[Inlet[Any], Any]] = deque()
+        # What must be kept but reached the old end of a full queue: older than all that waits, and delivered first.
+        self._rescued: deque[tuple[Inlet[Any], Any]] = deque()
+        self._woken = False
+        self._closed = False
+
+    def __len__(self) -> int:
+        return len(self._waiting) + len(self._rescued)
+
+    def admits(self, size: int) -> bool:
+        """Whether a payload of `size` bytes is accepted; one that is not is counted. In any thread."""
+        if size <= MAX_PAYLOAD:
+            return True
+        with self._lock:
+            self.dropped_oversize += 1
+        return False
+
+    def push(self, inlet: Inlet[Raw], raw: Raw) -> None:
+        """Queue a message; in any thread."""
+        with self._lock:
+            lost = self._make_room()
+            if self._closed:
+                lost, wake = (inlet, raw), False
+            else:
+                self._waiting.append((inlet, raw))
+                wake, self._woken = not self._woken, True
+        if lost is not None:
+            lost[0].discard(lost[1])
+        if wake:
+            self._wake_up()
+
+    def close(self) -> None:
+        """Discard all that waits and all that comes; a second call does nothing."""
+        with self._lock:
+            self._closed = True
+            left = [*self._rescued, *self._waiting]
+            self._rescued.clear()
+            self._waiting.clear()
+        for inlet, raw in left:
+            inlet.discard(raw)
+
+    def _make_room(self) -> tuple[Inlet[Any], Any] | None:
+        if len(self._waiting) < CAPACITY:
+            return None
+        oldest = self._waiting.popleft()
+        if oldest[0].keep:
+            self._rescued.append(oldest)
+            return None
+        self.dropped_overflow += 1
+        return oldest
+
+    def _wake_up(self) -> None:
+        try:
+            self._wake(self._drain)
+        except RuntimeError:  # the loop is closed: nobody will ever read this
+            self.close()
+
+    def _drain(self) -> None:
+        try:
+            for _ in range(BATCH):
+                message = self._next()
+                if message is None:
+                    break
+                message[0].deliver(message[1])
+        finally:
+            with self._lock:
+                self._woken = again = len(self) > 0
+            if again:
+                self._wake_up()
+
+    def _next(self) -> tuple[Inlet[Any], Any] | None:
+        with self._lock:
+            if self._rescued:
+                return self._rescued.popleft()
+            return self._waiting.popleft() if self._waiting else None
+
+
+class Inquiry:
+    """The replies to one query, gathered until the last has come or the time is over. Lives in one event loop.
+
+    Attributes:
+        replies: those that came, at most the newest `CAPACITY`; may be appended to in any thread.
+    """
+
+    def __init__(self) -> None:
+        self.replies: deque[Sample] = deque(maxlen=CAPACITY)
+        self._complete = asyncio.Event()
+
+    def finish(self) -> None:
+        """No further reply will come; only in the loop."""
+        self._complete.set()
+
+    async def result(self, timeout: float) -> list[Sample]:  # noqa: ASYNC109 - the bus's own limit, not a cancellation
+        """All replies that came until the last one, or within `timeout` seconds."""
+        try:
+            async with asyncio.timeout(timeout):
+                await self._complete.wait()
+        except TimeoutError:
+            pass
+        return list(self.replies)
+
+
+def answers(handler: Answer, ask: Sample) -> list[Sample]:
+    """What `handler` answers to `ask`, checked before the first of it is sent.
+
+    Raises:
+        ValueError: if an answer's key is not a key, or not one that was asked for.
+    """
+    samples = handler(ask)
+    for sample in samples:
+        check_key(sample.key)
+        if not matches(ask.key, sample.key):
+            raise ValueError(f"the answer {sample.key!r} is not what was asked for: {ask.key!r}")
+    return samples
+
+
+def check_timeout(timeout: float) -> None:
+    """Accept a time to wait for replies, in seconds.
+
+    Raises:
+        ValueError: if `timeout` is negative, not a number, or longer than a day.
+    """
+    if not 0 <= timeout <= 86400:
+        raise ValueError(f"a timeout of {timeout} s: expected 0 to 86400")

@@ -1,0 +1,118 @@
+"""One participant's messages on a bus: a header on each that leaves, a check of each that comes.
+
+What leaves is numbered and stamped. What comes is dropped if it does not decode, if somebody speaks for another, or if it is
+no news; every drop is counted by its reason and logged once per sender and reason. No message can raise an error here.
+"""
+
+import logging
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from lalliance_agents.bus.base import Bus, Delivery, Registration, Sample
+from lalliance_agents.errors import MessageError
+from lalliance_agents.wire.freshness import Freshness
+from lalliance_agents.wire.keys import Key, Keys, Kind
+from lalliance_agents.wire.messages import BODY_OF, Message, decode_at, encode
+
+_log = logging.getLogger(__name__)
+
+_DELIVERY = {
+    Kind.ACTIVITY: Delivery.PRESENCE,
+    Kind.HEARTBEAT: Delivery.PRESENCE,
+    Kind.MOTIVATION: Delivery.TELEMETRY,
+    Kind.LINK: Delivery.TELEMETRY,
+}
+
+Receiver = Callable[[Key, Message], None]
+
+
+class Messenger:
+    """Sends and receives checked messages.
+
+    Args:
+        bus: the connection; the messenger does not close it.
+        keys: the mission's keys.
+        me: the name that goes into each header.
+        incarnation: which life of `me` this is.
+        clock: gives mission time, in seconds.
+    """
+
+    def __init__(self, bus: Bus, keys: Keys, me: str, incarnation: int, clock: Callable[[], float]) -> None:
+        self.bus = bus
+        self.keys = keys
+        self.me = me
+        self.incarnation = incarnation
+        self.sent = 0
+        self.received = 0
+        self.dropped: Counter[str] = Counter()
+        self._clock = clock
+        self._seq = 0
+        self._freshness = Freshness()
+        self._logged: set[tuple[str, str]] = set()
+        self._registrations: list[Registration] = []
+
+    def compose(self, kind: Kind, /, **fields: Any) -> bytes:
+        """The packed message of `kind` with the next number."""
+        self._seq += 1
+        return encode(
+            BODY_OF[kind](sender=self.me, incarnation=self.incarnation, seq=self._seq, at=self._clock(), **fields)
+        )
+
+    def send(self, kind: Kind, /, *, key_task: str = "", key_robot: str = "", **fields: Any) -> None:
+        """Publish a message of `kind` under this participant's own name.
+
+        Args:
+            kind: what it is.
+            key_task: the task in the key, where there is one.
+            key_robot: the robot in the key, if not this participant itself.
+            fields: the message's fields, but for the header.
+        """
+        key = self.keys.build(kind, robot=key_robot or self.me, task=key_task)
+        self.bus.put(key, self.compose(kind, **fields), _DELIVERY.get(kind, Delivery.STATE))
+        self.sent += 1
+
+    async def listen(self, pattern: str, receiver: Receiver) -> Registration:
+        """Have `receiver` called with each fresh message whose key matches `pattern`."""
+        registration = await self.bus.subscribe(pattern, lambda sample: self.take(sample, receiver))
+        self._registrations.append(registration)
+        return registration
+
+    async def offer(self, pattern: str, current: Callable[[str], list[Sample]]) -> None:
+        """Answer queries that match `pattern` with what `current` returns for the query's own pattern."""
+        self._registrations.append(await self.bus.answer(pattern, lambda query: current(query.key)))
+
+    async def ask(self, pattern: str, receiver: Receiver, *, timeout: float) -> int:  # noqa: ASYNC109 - see Bus.query
+        """Query `pattern` and take the answers like messages; the number of answers within `timeout` seconds."""
+        answers = await self.bus.query(pattern, timeout=timeout)
+        for sample in answers:
+            self.take(sample, receiver)
+        return len(answers)
+
+    def take(self, sample: Sample, receiver: Receiver) -> None:
+        """Check one sample and hand it on if it is a fresh message of another participant."""
+        try:
+            key = self.keys.parse(sample.key)
+            if key.robot == self.me and key.kind is not Kind.SENSE_ROBOT:
+                return
+            message = decode_at(key, sample.payload)
+        except MessageError as error:
+            self.drop(error.reason, sample.key, str(error))
+            return
+        if not self._freshness.admit((message.sender, key.stream), message.incarnation, message.seq):
+            self.drop("stale", message.sender)
+            return
+        self.received += 1
+        receiver(key, message)
+
+    def drop(self, reason: str, source: str, detail: str = "") -> None:
+        """Count a message that is not used, and log the first of its source and reason."""
+        self.dropped[reason] += 1
+        if (source, reason) not in self._logged and reason != "stale" and len(self._logged) < 1000:
+            self._logged.add((source, reason))
+            _log.warning("dropping messages of %s: %s", source, detail or reason)
+
+    async def close(self) -> None:
+        """Stop listening and answering."""
+        while self._registrations:
+            await self._registrations.pop().close()

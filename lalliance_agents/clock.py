@@ -1,0 +1,31 @@
+"""Mission time: the one clock of a process.
+
+All logic is handed instants of mission time, in seconds since the process was born. A mission may run faster than real
+time; then all its lengths shrink alike, on every machine, and only this file knows.
+"""
+
+import asyncio
+
+
+class MissionClock:
+    """The event loop's monotonic clock times `speed`, beginning at 0.
+
+    Args:
+        speed: mission seconds per real second, above 0.
+    """
+
+    def __init__(self, speed: float = 1.0) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._speed = speed
+        self._born = self._loop.time()
+
+    def now(self) -> float:
+        """Mission time, in seconds."""
+        return (self._loop.time() - self._born) * self._speed
+
+    async def sleep_until(self, instant: float) -> None:
+        """Wait until mission time `instant`; an instant that has passed still lets other tasks run."""
+        await asyncio.sleep(max(self._real(instant) - self._loop.time(), 0.0))
+
+    def _real(self, instant: float) -> float:
+        return self._born + instant / self._speed

@@ -1,0 +1,227 @@
+"""The messages: msgpack maps with a header, each checked completely when it is decoded.
+
+The header says which version of this schema the sender speaks, who it is, which life of it this is (`incarnation`: a
+restarted robot is not its ghost), and where in that life (`seq`). `at` is the sender's own mission time and informative:
+nothing compares the clocks of two machines. Fields that a receiver does not know are ignored, so that fields can be added;
+any other change is a new version. Whatever bytes come in, `decode` returns a checked message or raises `MessageError`.
+"""
+
+from typing import Annotated, Any, Literal, TypeVar
+
+import msgpack
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from lalliance_agents.errors import MessageError
+from lalliance_agents.wire.keys import NAME_PATTERN, Key, Kind
+
+VERSION: Literal[1] = 1
+
+#: Larger messages are dropped unread, in bytes.
+MAX_SIZE = 64 * 1024
+
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+Count = Annotated[int, Field(ge=0, lt=2**63)]
+Seconds = Annotated[float, Field(ge=0, le=1e12)]
+Scalars = dict[str, str | int | float | bool | None]
+
+
+class Message(BaseModel):
+    """The header that every message begins with."""
+
+    model_config = ConfigDict(
+        frozen=True, strict=True, extra="ignore", allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+    v: Literal[1] = VERSION
+    sender: Name
+    incarnation: Count
+    seq: Count
+    at: Seconds
+
+
+class Activity(Message):
+    """A robot is on a task."""
+
+    task: Name
+    trial: Count
+    active_for: Seconds
+    """How long its set has been active, in seconds."""
+    expected: Seconds
+    """The time that it expects to need, in seconds."""
+
+
+class Heartbeat(Message):
+    """A robot is there, and idle."""
+
+    trial: Count
+
+
+class Hello(Message):
+    """The tasks a robot can do; used only to choose whom to listen to."""
+
+    tasks: list[Name]
+
+
+class Action(Message):
+    """What a robot's body works on."""
+
+    task: Name | None
+    trial: Count
+    fewest: Count
+    """The smallest number of samples that its monitors hold of any teammate it knows for any task they share."""
+
+
+class TaskState(Message):
+    """Sensory feedback on one task."""
+
+    trial: Count
+    learning: Literal["active", "adaptive"]
+    applicable: bool
+    complete: bool
+    progress: Annotated[float, Field(ge=0, le=1)]
+
+
+class BodyState(Message):
+    """What a robot can sense of itself, and of the mission."""
+
+    mission: Literal["waiting", "running", "complete", "failed"]
+    trial: Count
+    learning: Literal["active", "adaptive"]
+    failures: list[str] = []
+
+
+class DecisionMade(Message):
+    """One decision with everything behind it; see `lalliance_agents.model.events.Decision`."""
+
+    verb: str
+    task: Name
+    cause: str
+    other: Name | None
+    active_for: Seconds
+    trial: Count
+    factors: Scalars
+    teammates: list[Scalars]
+
+
+class Motivations(Message):
+    """All motivations of a robot, each with its factors."""
+
+    active: list[Name]
+    sets: dict[Name, Scalars]
+
+
+class Reception(BaseModel):
+    """What came from one teammate."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="ignore", allow_inf_nan=False)
+
+    received: Count
+    silence: Seconds | None = None
+    """Time since the last message, in seconds."""
+
+
+class LinkReport(Message):
+    """What a robot sent and received, and whether it kept its control period."""
+
+    sent: Count
+    received: Count
+    dropped: dict[str, Count]
+    """Messages not used, by reason."""
+    teammates: dict[Name, Reception]
+    ticks: Count
+    missed: Count
+    """Control periods that passed without a control step since the mission began."""
+    final: bool = False
+
+
+class Event(Message):
+    """Something happened in the world."""
+
+    kind: str
+    robot: Name | None = None
+    task: Name | None = None
+    elapsed: Seconds
+    """Time since the trial began, in seconds."""
+    trial: Count
+    text: str
+    details: Scalars = {}
+
+
+class Status(Message):
+    """How the mission stands."""
+
+    mission: Literal["waiting", "running", "complete", "failed"]
+    trial: Count
+    trials: Count
+    learning: Literal["active", "adaptive"]
+    elapsed: Seconds
+    tasks: dict[Name, Scalars]
+    robots: dict[Name, Scalars]
+
+
+BODY_OF: dict[Kind, type[Message]] = {
+    Kind.ACTIVITY: Activity,
+    Kind.HEARTBEAT: Heartbeat,
+    Kind.HELLO: Hello,
+    Kind.ACTION: Action,
+    Kind.SENSE_TASK: TaskState,
+    Kind.SENSE_ROBOT: BodyState,
+    Kind.DECISION: DecisionMade,
+    Kind.MOTIVATION: Motivations,
+    Kind.LINK: LinkReport,
+    Kind.EVENT: Event,
+    Kind.STATUS: Status,
+}
+
+M = TypeVar("M", bound=Message)
+
+
+def encode(message: Message) -> bytes:
+    """Pack a message."""
+    packed: bytes = msgpack.packb(message.model_dump())
+    return packed
+
+
+def decode(kind: type[M], payload: bytes) -> M:
+    """Unpack and check a message.
+
+    Raises:
+        MessageError: the payload is too large, no msgpack, of another version, or not a valid `kind`; nothing else.
+    """
+    if len(payload) > MAX_SIZE:
+        raise MessageError("size", f"{len(payload)} bytes, more than {MAX_SIZE}")
+    document = _unpack(payload)
+    if not isinstance(document, dict):
+        raise MessageError("form", "not a map")
+    if document.get("v") != VERSION:
+        raise MessageError("version", f"not version {VERSION}")
+    try:
+        return kind.model_validate(document)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise MessageError("content", f"{where}: {first['type']}") from None
+
+
+def _unpack(payload: bytes) -> Any:
+    try:
+        return msgpack.unpackb(payload)
+    except Exception as error:
+        raise MessageError("msgpack", type(error).__name__) from None
+
+
+def decode_at(key: Key, payload: bytes) -> Message:
+    """Decode what came on `key`, and hold its sender and task against the key.
+
+    Raises:
+        MessageError: it does not decode, or somebody speaks for another.
+    """
+    body = BODY_OF.get(key.kind)
+    if body is None:
+        raise MessageError("key", f"{key.kind.name} carries no message")
+    message = decode(body, payload)
+    if key.kind is not Kind.SENSE_ROBOT and key.robot is not None and message.sender != key.robot:
+        raise MessageError("sender", f"{message.sender} on a key of {key.robot}")
+    if isinstance(message, Activity) and message.task != key.task:
+        raise MessageError("task", f"{message.task} on a key of {key.task}")
+    return message

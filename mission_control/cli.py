@@ -1,0 +1,284 @@
+"""The commands. Each reads its input, does its work through the other rooms, and turns errors into a sentence.
+
+Exit status: 0 the mission is complete or the command did its work, 1 the mission is not complete, 2 bad input or a missing
+component. With `--json`, standard output holds one JSON document and nothing else. Heavy imports are made where they are
+needed, so that `lalliance --help` is quick.
+"""
+
+import asyncio
+import contextlib
+import json
+import logging
+import os
+import signal
+import sys
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
+
+import typer
+
+from lalliance_agents.errors import LallianceError, UserError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from lalliance_agents.config import Mission
+    from mission_control.live import Lines
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+T = TypeVar("T")
+
+app = typer.Typer(
+    name="lalliance",
+    help="Fault-tolerant, learning task allocation for teams of different robots, without a coordinator.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+MissionPath = Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file (YAML).", show_default=False)]
+Speed = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Mission seconds per real second.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="All randomness; default: the mission's own seed.")]
+Connect = Annotated[str, typer.Option(metavar="ENDPOINT", help="The router to connect to.")]
+Parent = Annotated[int | None, typer.Option(hidden=True, help="End when the process with this id does.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output.")]
+Learned = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Where robots keep what they learned; default: nowhere.")
+]
+
+
+@app.command()
+def run(
+    path: MissionPath,
+    speed: Speed = 1.0,
+    seed: Seed = None,
+    connect: Annotated[
+        str | None, typer.Option(metavar="ENDPOINT", help="Use the router there instead of starting one.")
+    ] = None,
+    listen: Annotated[
+        str | None,
+        typer.Option(metavar="ENDPOINT", help="Where the router listens; default: a free port of this machine."),
+    ] = None,
+    learned: Learned = None,
+    plain: Annotated[bool, typer.Option("--plain", help="One line per event instead of the live view.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run a mission on this machine: router, world and one process per robot."""
+    from rich.console import Console
+
+    from mission_control.launch import Launcher, Plan
+    from mission_control.summary import show
+
+    if connect is not None and listen is not None:
+        raise UserError("--connect uses a router that runs already, --listen starts one; expected one of the two")
+    mission = _load(path, seed)
+    console = Console(stderr=as_json)
+    plan = Plan(path.resolve(), mission, speed, connect, listen, None if learned is None else learned.resolve())
+    for warning in mission.warnings():
+        _warn(f"{path}: {warning}")
+    with _view(mission, console, plain=plain) as view:
+        summary = _run_until_told(Launcher(plan, view).run())
+    if as_json:
+        typer.echo(json.dumps(summary))
+    else:
+        show(summary, console)
+    raise typer.Exit(0 if summary["complete"] else 1)
+
+
+@app.command()
+def router(
+    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen.")] = DEFAULT_ENDPOINT,
+    parent: Parent = None,
+) -> None:
+    """Run a router: where robots, world and operators of a mission meet."""
+    _follow(parent)
+
+    async def serve() -> None:
+        from lalliance_agents.bus.router import open_router
+
+        async with await open_router(listen) as running:
+            typer.echo(f"router listens on {running.endpoint}")
+            sys.stdout.flush()
+            await asyncio.Event().wait()
+
+    _run_until_told(serve())
+
+
+@app.command()
+def world(
+    path: MissionPath,
+    connect: Connect = DEFAULT_ENDPOINT,
+    speed: Speed = 1.0,
+    seed: Seed = None,
+    wait: Annotated[
+        float, typer.Option(min=0.0, help="Seconds to wait for the whole team before beginning with a part of it.")
+    ] = 30.0,
+    as_json: AsJson = False,
+    parent: Parent = None,
+) -> None:
+    """Run the world server of a mission."""
+    _follow(parent)
+    mission = _load(path, seed)
+
+    async def serve() -> dict[str, Any]:
+        from lalliance_agents.agent.catalog import fresh_incarnation
+        from lalliance_agents.bus.zenoh_bus import open_bus
+        from world_server.server import WorldServer
+
+        async with await open_bus(connect) as bus:
+            server = WorldServer(mission, bus=bus, incarnation=fresh_incarnation(), speed=speed, patience=wait)
+            return await server.run()
+
+    summary = _run_until_told(serve())
+    if as_json:
+        typer.echo(json.dumps(summary))
+    else:
+        from rich.console import Console
+
+        from mission_control.summary import show
+
+        show(summary, Console())
+    raise typer.Exit(0 if summary["complete"] else 1)
+
+
+@app.command()
+def robot(
+    path: MissionPath,
+    name: Annotated[str, typer.Option(help="Which robot of the mission.", show_default=False)],
+    connect: Connect = DEFAULT_ENDPOINT,
+    speed: Speed = 1.0,
+    seed: Seed = None,
+    behaviors: Annotated[
+        str | None,
+        typer.Option(metavar="MODULE:FACTORY", help="Behaviour sets of your own; default: what the mission says."),
+    ] = None,
+    learned: Learned = None,
+    incarnation: Annotated[
+        int | None, typer.Option(min=0, hidden=True, help="Which life of the robot this is.")
+    ] = None,
+    without_world: Annotated[bool, typer.Option("--without-world", help="There is no world server.")] = False,
+    parent: Parent = None,
+) -> None:
+    """Run one robot of a mission until the mission is over."""
+    _follow(parent)
+    mission = _load(path, seed)
+    if name not in mission.robots:
+        raise UserError(f"{path}: no robot {name!r} in this mission; expected one of {', '.join(mission.robots)}")
+
+    async def live() -> str:
+        from lalliance_agents.agent.behavior import load_behaviors
+        from lalliance_agents.agent.catalog import Catalog
+        from lalliance_agents.agent.runtime import Robot
+        from lalliance_agents.bus.zenoh_bus import open_bus
+        from lalliance_agents.clock import MissionClock
+
+        place = behaviors or mission.robots[name].behaviors
+        sets = load_behaviors(place) if place else []
+        catalog = None if learned is None else Catalog(learned, name)
+        async with await open_bus(connect) as bus:
+            member = Robot(
+                mission,
+                name,
+                bus=bus,
+                behaviors=sets,
+                clock=MissionClock(speed),
+                catalog=catalog,
+                incarnation=incarnation,
+                world=not without_world,
+            )
+            return await member.run()
+
+    outcome = _run_until_told(live())
+    raise typer.Exit(0 if outcome == "complete" else 1)
+
+
+@app.command()
+def check(path: MissionPath) -> None:
+    """Check a mission file; prints what it contains, or the first fault."""
+    mission = _load(path, None)
+    for warning in mission.warnings():
+        _warn(f"{path}: {warning}")
+    typer.echo(
+        f"{path}: mission {mission.name}, {len(mission.robots)} robots, {len(mission.tasks)} tasks, "
+        f"{sum(phase.trials for phase in mission.phases)} trials, {len(mission.faults)} faults: good"
+    )
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of mission files, for editors."""
+    from mission_control.missions import mission_schema
+
+    typer.echo(json.dumps(mission_schema(), indent=2))
+
+
+def _load(path: Path, seed: int | None) -> "Mission":
+    """The checked mission at `path`, with the environment's options checked too."""
+    from mission_control.missions import load
+
+    mission = load(path)
+    return mission if seed is None else mission.model_copy(update={"seed": seed})
+
+
+def _view(mission: "Mission", console: "Console", *, plain: bool) -> "Lines":
+    from mission_control.live import Lines, LiveView
+
+    return LiveView(mission, console) if console.is_terminal and not plain else Lines(console)
+
+
+def _follow(parent: int | None) -> None:
+    """What a single process does first: log to standard error, and end with its parent if it has one."""
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s", stream=sys.stderr)
+    if parent is not None:
+        from mission_control.processes import end_with_parent
+
+        end_with_parent(parent)
+
+
+def _warn(text: str) -> None:
+    typer.echo(f"lalliance: warning: {text}", err=True)
+
+
+def _run_until_told(work: Coroutine[Any, Any, T]) -> T:
+    """Run `work`; SIGINT and SIGTERM cancel it and end the process with 128 + the signal's number."""
+    told: list[int] = []
+
+    async def supervised() -> T:
+        task = asyncio.ensure_future(work)
+        loop = asyncio.get_running_loop()
+
+        def stop(number: int) -> None:
+            told.append(number)
+            task.cancel()
+
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, stop, number)
+        return await task
+
+    try:
+        return asyncio.run(supervised())
+    except asyncio.CancelledError:
+        raise typer.Exit(128 + (told[0] if told else signal.SIGTERM)) from None
+
+
+def _fail(text: str, status: int) -> NoReturn:
+    typer.echo(f"lalliance: {text}", err=True)
+    sys.exit(status)
+
+
+def main() -> None:
+    """Run the command line; errors become one sentence on standard error."""
+    sys.path.insert(0, str(Path.cwd()))
+    try:
+        app()
+    except UserError as error:
+        _fail(str(error), 2)
+    except LallianceError as error:
+        _fail(str(error), 1)
+    except BrokenPipeError:
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)

@@ -1,0 +1,215 @@
+"""Run a mission on this machine: a router, a world server and one process per robot, and their end.
+
+The launcher starts the processes, carries out the world's orders (kill, start), starts its router again if that dies, shows
+what happens, and leaves no process behind. It takes no part in the mission: robots and world talk to one another alone.
+"""
+
+import asyncio
+import contextlib
+import json
+import signal
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lalliance_agents.bus.base import Bus
+from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.bus.router import free_endpoint
+from lalliance_agents.bus.zenoh_bus import open_bus
+from lalliance_agents.config import Mission
+from lalliance_agents.errors import BusError, LallianceError
+from lalliance_agents.wire.keys import Key, Keys, Kind
+from lalliance_agents.wire.messages import Event, Message
+from mission_control.live import Lines
+from mission_control.processes import GRACE, Child
+
+OPERATOR = "operator"
+#: How long the router may take to listen, in seconds.
+ROUTER_TIMEOUT = 8.0
+#: How often a router that dies is started again.
+ROUTER_RESTARTS = 20
+
+
+class LaunchError(LallianceError):
+    """A mission that could not be brought to its end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What to launch, and how.
+
+    Attributes:
+        path: the mission file, handed to every process.
+        mission: what it says.
+        speed: mission seconds per real second.
+        connect: the endpoint of a router that runs already; None: start one.
+        listen: where a router of our own listens; None: a free port on this machine.
+        learned: the folder of learned times; None: nothing is stored.
+    """
+
+    path: Path
+    mission: Mission
+    speed: float = 1.0
+    connect: str | None = None
+    listen: str | None = None
+    learned: Path | None = None
+
+    def common(self, endpoint: str) -> list[str]:
+        """Arguments of every process of the mission."""
+        return ["--connect", endpoint, "--speed", repr(self.speed), "--seed", str(self.mission.seed)]
+
+    def robot(self, name: str, incarnation: int, endpoint: str) -> list[str]:
+        """Arguments of a robot's process."""
+        learned = [] if self.learned is None else ["--learned", str(self.learned)]
+        life = [] if self.learned is not None else ["--incarnation", str(incarnation)]
+        return ["robot", str(self.path), "--name", name, *self.common(endpoint), *learned, *life]
+
+    def world(self, endpoint: str) -> list[str]:
+        """Arguments of the world server's process."""
+        return ["world", str(self.path), "--json", *self.common(endpoint)]
+
+
+class Launcher:
+    """Runs one mission.
+
+    Args:
+        plan: what to launch.
+        view: where to show what happens.
+    """
+
+    def __init__(self, plan: Plan, view: Lines) -> None:
+        self._plan = plan
+        self._view = view
+        self._endpoint = plan.connect or plan.listen or free_endpoint()
+        self._router: Child | None = None
+        self._robots: dict[str, Child] = {}
+        self._lives: dict[str, int] = {}
+        self._done: set[int] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._robot_ended = asyncio.Event()
+
+    async def run(self) -> dict[str, Any]:
+        """Run the mission to its end; its summary.
+
+        Raises:
+            BusError: no router could be started or reached.
+            LaunchError: the mission could not be brought to its end.
+        """
+        world: Child | None = None
+        try:
+            if self._plan.connect is None:
+                await self._start_router()
+            async with await open_bus(self._endpoint) as bus:
+                messenger = await self._watch(bus)
+                world = await Child.start("world", self._plan.world(self._endpoint), self._on_line)
+                first = [name for name, spec in self._plan.mission.robots.items() if spec.joins == 0]
+                await asyncio.gather(*(self._start_robot(name) for name in first))
+                summary = await self._await_end(world)
+                await self._await_robots()
+                await messenger.close()
+            return summary
+        finally:
+            await self._end_all(world)
+
+    async def _watch(self, bus: Bus) -> Messenger:
+        keys = Keys(self._plan.mission.name)
+        loop = asyncio.get_running_loop()
+        messenger = Messenger(bus, keys, OPERATOR, 1, loop.time)
+        for kind in (Kind.EVENT, Kind.STATUS, Kind.DECISION, Kind.MOTIVATION):
+            await messenger.listen(keys.build(kind), self._take)
+        return messenger
+
+    def _take(self, _: Key, message: Message) -> None:
+        if isinstance(message, Event) and message.kind == "order":
+            self._carry_out(message)
+        self._view.take(message)
+
+    def _carry_out(self, order: Event) -> None:
+        """Do what the world orders, each order once."""
+        number, robot = order.details.get("number"), order.robot
+        if not isinstance(number, int) or robot not in self._plan.mission.robots or number in self._done:
+            return
+        self._done.add(number)
+        if order.details.get("deed") == "kill":
+            if robot in self._robots:
+                self._robots[robot].send_signal(signal.SIGKILL)
+        else:
+            self._spawn(self._start_robot(robot))
+
+    def _spawn(self, work: Any) -> None:
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _start_robot(self, name: str) -> None:
+        self._lives[name] = self._lives.get(name, 0) + 1
+        child = await Child.start(name, self._plan.robot(name, self._lives[name], self._endpoint), self._on_line)
+        self._robots[name] = child
+        self._spawn(self._observe(child))
+
+    async def _observe(self, child: Child) -> None:
+        code = await child.wait()
+        if code not in {0, 1}:
+            self._view.say(f"robot {child.name} ended: {child.status}")
+        self._robot_ended.set()
+
+    def _on_line(self, name: str, line: str) -> None:
+        self._view.say(f"[{name}] {line}")
+
+    async def _start_router(self) -> None:
+        child = await Child.start("router", ["router", "--listen", self._endpoint], lambda _name, _line: None)
+        self._router = child
+        try:
+            async with asyncio.timeout(ROUTER_TIMEOUT):
+                ready = await child.read_line()
+        except TimeoutError:
+            raise BusError(
+                f"The router at {self._endpoint} did not begin to listen within {ROUTER_TIMEOUT:g} s."
+            ) from None
+        if not ready:
+            await child.wait()
+            raise BusError(child.last_line.removeprefix("lalliance: ") or f"The router ended with {child.status}.")
+        self._spawn(self._keep_router(child))
+
+    async def _keep_router(self, child: Child) -> None:
+        """Start the router again when it dies; clients come back by themselves."""
+        for _ in range(ROUTER_RESTARTS):
+            await child.wait()
+            self._view.say(f"the router ended ({child.status}); starting it again")
+            arguments = ["router", "--listen", self._endpoint]
+            child = self._router = await Child.start("router", arguments, self._on_line)
+            await child.read_line()
+
+    async def _await_end(self, world: Child) -> dict[str, Any]:
+        ending = asyncio.create_task(world.read_all())
+        try:
+            while not ending.done():
+                robots_gone = asyncio.create_task(self._robot_ended.wait())
+                await asyncio.wait({ending, robots_gone}, return_when=asyncio.FIRST_COMPLETED)
+                robots_gone.cancel()
+                self._robot_ended.clear()
+            return await self._read_summary(world, ending.result())
+        finally:
+            ending.cancel()
+
+    async def _read_summary(self, world: Child, output: str) -> dict[str, Any]:
+        await world.wait()
+        try:
+            summary: dict[str, Any] = json.loads(output)
+        except ValueError:
+            raise LaunchError(f"the world server ended without a summary ({world.status}): {world.last_line}") from None
+        return summary
+
+    async def _await_robots(self) -> None:
+        """Robots end by themselves when the mission is over."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(2 * GRACE):
+                await asyncio.gather(*(child.wait() for child in self._robots.values()))
+
+    async def _end_all(self, world: Child | None) -> None:
+        for task in list(self._tasks):
+            task.cancel()
+        children = [*self._robots.values(), *([world] if world else [])]
+        await asyncio.gather(*(child.end() for child in children))
+        if self._router is not None:
+            await self._router.end()

@@ -1,0 +1,148 @@
+"""The live view: who is on what, how motivated, how far. Where there is no terminal, one line per event."""
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from lalliance_agents.config import Mission
+from lalliance_agents.wire.messages import Message
+from mission_control.picture import Picture
+
+_BAR = 16
+
+
+def bar(share: float, width: int = _BAR) -> str:
+    """A bar of blocks for a share between 0 and 1."""
+    filled = round(min(max(share, 0.0), 1.0) * width)
+    return "█" * filled + "░" * (width - filled)
+
+
+class Lines:
+    """A view for where there is no terminal: each event as a line.
+
+    Args:
+        console: where to write.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._picture = Picture()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pass
+
+    def take(self, message: Message) -> None:
+        """Show a message of the mission."""
+        line = self._picture.take(message)
+        if line is not None:
+            self._console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+    def say(self, text: str) -> None:
+        """Show a remark that is no message of the mission."""
+        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
+class LiveView(Lines):
+    """A view that stays in place and is redrawn a few times a second.
+
+    Args:
+        mission: the mission it shows.
+        console: a terminal.
+    """
+
+    def __init__(self, mission: Mission, console: Console) -> None:
+        super().__init__(console)
+        self._mission = mission
+        self._live = Live(console=console, get_renderable=self._render, refresh_per_second=5, transient=True)
+
+    def __enter__(self) -> Self:
+        self._live.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.__exit__(kind, error, trace)
+
+    def take(self, message: Message) -> None:
+        """Put a message into the picture; it shows at the next redraw."""
+        self._picture.take(message)
+
+    def say(self, text: str) -> None:
+        """Show a remark among the events."""
+        self._picture.events.append(text)
+
+    def _render(self) -> RenderableType:
+        height = self._console.size.height
+        parts: list[Callable[[int], RenderableType]] = [self._headline, self._robots, self._tasks]
+        rows = [1, min(len(self._mission.robots), height // 3) + 2, min(len(self._mission.tasks), height // 3) + 2]
+        left = max(height - sum(rows) - 2, 3)
+        return Group(*(part(row) for part, row in zip(parts, rows, strict=True)), self._events(left))
+
+    def _headline(self, _: int) -> Text:
+        status = self._picture.status
+        if status is None:
+            return Text(f"{self._mission.name}: starting {len(self._mission.robots)} robots …", style="bold")
+        trial = f", trial {status.trial} ({status.learning} learning)" if status.trials > 1 else ""
+        return Text(f"{self._mission.name}: {status.mission}, {status.elapsed:.1f} s{trial}", style="bold")
+
+    def _robots(self, rows: int) -> Table:
+        table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False)
+        for column in ("robot", "on", "most motivated for", "motivation"):
+            table.add_column(column, no_wrap=True)
+        status = self._picture.status
+        facts = status.robots if status else {}
+        for robot in list(self._mission.robots)[: rows - 2]:
+            fact = facts.get(robot, {})
+            if not fact.get("present"):
+                table.add_row(Text(robot, style="dim"), Text("not there", style="red" if status else "dim"), "", "")
+                continue
+            task = fact.get("task")
+            table.add_row(
+                robot, Text(str(task), style="green") if task else Text("idle", style="dim"), *self._wish(robot)
+            )
+        return table
+
+    def _wish(self, robot: str) -> tuple[str, str]:
+        strongest = self._picture.strongest(robot)
+        if strongest is None:
+            return "", ""
+        task, factors = strongest
+        theta = self._mission.parameters_of(robot).threshold
+        motivation = factors.get("motivation")
+        share = motivation / theta if isinstance(motivation, int | float) else 0.0
+        if factors.get("pace") == "working":
+            return "", bar(1.0)
+        return (f"{task} ({factors.get('pace')})" if share > 0 else ""), bar(share)
+
+    def _tasks(self, rows: int) -> Table:
+        table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False)
+        for column in ("task", "progress", "", "robots"):
+            table.add_column(column, no_wrap=True)
+        status = self._picture.status
+        facts = status.tasks if status else {}
+        open_first = sorted(self._mission.tasks, key=lambda task: bool(facts.get(task, {}).get("complete")))
+        for task in open_first[: rows - 2]:
+            fact = facts.get(task, {})
+            progress = fact.get("progress")
+            share = float(progress) if isinstance(progress, int | float) else 0.0
+            state = "done" if fact.get("complete") else ("" if fact.get("applicable") else "not yet")
+            style = "dim" if state else ""
+            table.add_row(
+                Text(task, style=style), bar(share), Text(state, style=style), ", ".join(self._picture.working(task))
+            )
+        return table
+
+    def _events(self, rows: int) -> Text:
+        lines = list(self._picture.events)[-rows:]
+        return Text("\n".join(lines), style="dim", no_wrap=True, overflow="ellipsis")

@@ -1,0 +1,79 @@
+"""What an operator knows of a running mission, put together from the messages on the bus. Pure.
+
+Nothing is drawn here: `live` shows a picture on a terminal, `events` prints what it adds line by line.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from lalliance_agents.wire.messages import DecisionMade, Event, Message, Motivations, Scalars, Status
+
+#: Events kept for showing.
+KEPT_EVENTS = 200
+
+
+@dataclass(slots=True)
+class Picture:
+    """The latest of everything."""
+
+    status: Status | None = None
+    motivations: dict[str, Motivations] = field(default_factory=dict)
+    events: deque[str] = field(default_factory=lambda: deque(maxlen=KEPT_EVENTS))
+
+    def take(self, message: Message) -> str | None:
+        """Put a message into the picture; the line it adds to the events, if any."""
+        line = None
+        match message:
+            case Status():
+                self.status = message
+            case Motivations():
+                self.motivations[message.sender] = message
+            case Event() if message.kind != "order" or message.details.get("deed") == "kill":
+                line = f"{message.elapsed:7.1f} s  {message.text}"
+            case DecisionMade():
+                line = f"{self._elapsed():7.1f} s  {describe(message)}"
+            case _:
+                pass
+        if line is not None:
+            self.events.append(line)
+        return line
+
+    def _elapsed(self) -> float:
+        return self.status.elapsed if self.status else 0.0
+
+    def working(self, task: str) -> list[str]:
+        """The robots whose bodies work on `task`."""
+        robots = self.status.robots if self.status else {}
+        return [robot for robot, facts in robots.items() if facts.get("task") == task and facts.get("present")]
+
+    def strongest(self, robot: str) -> tuple[str, Scalars] | None:
+        """The task a robot is most motivated for, with the factors of that motivation."""
+        sets = self.motivations[robot].sets if robot in self.motivations else {}
+        ranked = sorted(sets.items(), key=lambda item: -_number(item[1].get("motivation")))
+        return ranked[0] if ranked else None
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
+_REASONS = {
+    "free": "nobody is on it",
+    "silence": "{other} is silent",
+    "impatience": "patience with {other} has ended",
+    "released": "{other} has left it",
+    "contender": "to {other}, after {active:.1f} s",
+    "collision": "to {other}, which started at the same time and expects to be faster",
+    "no_success": "no success after {active:.1f} s",
+    "sensed": "after {active:.1f} s",
+    "inapplicable": "it does not apply just now",
+    "body_failed": "its own code failed",
+    "new_trial": "the next trial begins",
+}
+
+
+def describe(made: DecisionMade) -> str:
+    """A decision as one line."""
+    verbs = {"activate": "starts", "yield": "yields", "give_up": "gives up", "complete": "has done", "drop": "drops"}
+    reason = _REASONS.get(made.cause, made.cause).format(other=made.other, active=made.active_for)
+    return f"{made.sender} {verbs.get(made.verb, made.verb)} {made.task}: {reason}"

@@ -1,0 +1,129 @@
+"""Child processes that never outlive their parent.
+
+Each child is a `lalliance` command of its own in a session of its own, so that Ctrl-C reaches only the parent, which then
+ends its children in order. A child is told its parent's process id and has the kernel kill it when that process is gone,
+whatever the parent died of.
+"""
+
+import asyncio
+import contextlib
+import ctypes
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+
+#: How long a child may take to end by itself when asked to, in seconds.
+GRACE = 1.0
+
+_PR_SET_PDEATHSIG = 1
+
+OnLine = Callable[[str, str], None]
+
+
+def end_with_parent(parent: int) -> None:
+    """Have this process killed when its parent `parent` ends; ends it at once if that is gone already."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+class Child:
+    """One running child process.
+
+    Args:
+        name: what it is called in messages.
+        process: the process.
+        on_line: called with the name and each line that the child writes to standard error.
+    """
+
+    def __init__(self, name: str, process: asyncio.subprocess.Process, on_line: OnLine) -> None:
+        self.name = name
+        self._process = process
+        self._on_line = on_line
+        self._errors = asyncio.create_task(self._read_errors(), name=f"errors of {name}")
+        self.last_line = ""
+
+    @classmethod
+    async def start(cls, name: str, arguments: Sequence[str], on_line: OnLine) -> "Child":
+        """Start `lalliance` with `arguments`; the parent's id is handed down."""
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "mission_control",
+            *arguments,
+            "--parent",
+            str(os.getpid()),
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            start_new_session=True,
+            limit=2**24,
+        )
+        return cls(name, process, on_line)
+
+    def __repr__(self) -> str:
+        return f"<Child {self.name}: process {self._process.pid}, {self.status}>"
+
+    @property
+    def pid(self) -> int:
+        """The process's id."""
+        return self._process.pid
+
+    @property
+    def status(self) -> str:
+        """Whether it runs, or how it ended."""
+        code = self._process.returncode
+        if code is None:
+            return "running"
+        return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._process.returncode is None
+
+    @property
+    def exit_code(self) -> int | None:
+        """Its exit status; negative: the signal that killed it; None while it runs."""
+        return self._process.returncode
+
+    async def read_line(self) -> str:
+        """The next line of its standard output; empty when that has ended."""
+        stream = self._process.stdout
+        return "" if stream is None else (await stream.readline()).decode(errors="replace").rstrip()
+
+    async def read_all(self) -> str:
+        """All that it still writes to its standard output."""
+        stream = self._process.stdout
+        return "" if stream is None else (await stream.read()).decode(errors="replace")
+
+    async def wait(self) -> int:
+        """Wait for its end; its exit status."""
+        code = await self._process.wait()
+        await self._errors
+        return code
+
+    def send_signal(self, number: signal.Signals) -> None:
+        """Send a signal, unless it has ended."""
+        if self.running:
+            with contextlib.suppress(ProcessLookupError):
+                self._process.send_signal(number)
+
+    async def end(self) -> None:
+        """Ask it to end, and kill it if it does not within the grace."""
+        self.send_signal(signal.SIGTERM)
+        try:
+            async with asyncio.timeout(GRACE):
+                await self._process.wait()
+        except TimeoutError:
+            self.send_signal(signal.SIGKILL)
+            await self._process.wait()
+        await self._errors
+
+    async def _read_errors(self) -> None:
+        stream = self._process.stderr
+        while stream is not None and (line := await stream.readline()):
+            self.last_line = line.decode(errors="replace").rstrip()
+            self._on_line(self.name, self.last_line)

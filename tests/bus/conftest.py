@@ -1,0 +1,156 @@
+"""The buses under test: an in-memory hub, and a router with real sessions on loopback, behind one `Team`.
+
+A `Team` makes participants and closes what a test leaves open. `mortal` is a participant that announces a presence and can
+be killed without a goodbye: on the real bus that is a process of its own. Nothing here sleeps for a fixed time; `eventually`
+polls what no event reports.
+"""
+
+import asyncio
+import signal
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AsyncExitStack
+from typing import Any, Self
+
+import pytest
+
+from lalliance_agents.bus.base import Bus
+from lalliance_agents.bus.memory import MemoryBus, MemoryHub
+from lalliance_agents.bus.router import free_endpoint, open_router
+from lalliance_agents.bus.zenoh_bus import open_bus
+
+PATIENCE = 20.0
+
+MORTAL = """
+import asyncio, sys
+from lalliance_agents.bus.zenoh_bus import open_bus
+
+async def main():
+    async with await open_bus(sys.argv[1]) as bus:
+        await bus.announce_presence(sys.argv[2])
+        await asyncio.Event().wait()
+
+asyncio.run(main())
+"""
+
+ROUTER = """
+import asyncio, sys
+from lalliance_agents.bus.router import open_router
+
+async def main():
+    async with await open_router(sys.argv[1]):
+        print("listening", flush=True)
+        await asyncio.Event().wait()
+
+asyncio.run(main())
+"""
+
+
+class Process:
+    """A Python process under a test's control."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self._process = process
+
+    @classmethod
+    async def start(cls, stack: AsyncExitStack, program: str, *arguments: str) -> Self:
+        pipe = asyncio.subprocess.PIPE
+        started = await asyncio.create_subprocess_exec(
+            sys.executable, "-c", program, *arguments, stdin=pipe, stdout=pipe, stderr=pipe
+        )
+        process = cls(started)
+        stack.push_async_callback(process.kill)
+        return process
+
+    async def first_line(self) -> str:
+        assert self._process.stdout is not None
+        async with asyncio.timeout(PATIENCE):
+            return (await self._process.stdout.readline()).decode().strip()
+
+    def hang(self) -> None:
+        self._process.send_signal(signal.SIGSTOP)
+
+    async def kill(self) -> None:
+        if self._process.returncode is None:
+            self._process.kill()
+            await self._process.communicate()
+
+    async def finish(self, text: str = "") -> tuple[int | None, str, str]:
+        """Write `text`; wait for the end: exit status, standard output and standard error."""
+        async with asyncio.timeout(PATIENCE):
+            out, err = await self._process.communicate(text.encode())
+        return self._process.returncode, out.decode(), err.decode()
+
+
+class MemoryTeam:
+    def __init__(self, stack: AsyncExitStack) -> None:
+        self._stack = stack
+        self._hub = MemoryHub()
+
+    async def bus(self) -> Bus:
+        return await self._stack.enter_async_context(MemoryBus(self._hub))
+
+    async def mortal(self, key: str) -> Callable[[], Awaitable[None]]:
+        bus = MemoryBus(self._hub)
+        await bus.announce_presence(key)
+
+        async def kill() -> None:
+            bus.kill()
+
+        return kill
+
+
+class ZenohTeam:
+    def __init__(self, stack: AsyncExitStack, endpoint: str) -> None:
+        self._stack = stack
+        self.endpoint = endpoint
+
+    async def bus(self) -> Bus:
+        return await self._stack.enter_async_context(await open_bus(self.endpoint, timeout=PATIENCE))
+
+    async def mortal(self, key: str) -> Callable[[], Awaitable[None]]:
+        return (await Process.start(self._stack, MORTAL, self.endpoint, key)).kill
+
+
+@pytest.fixture(params=["memory", "zenoh"])
+async def team(request: pytest.FixtureRequest) -> AsyncIterator[MemoryTeam | ZenohTeam]:
+    async with AsyncExitStack() as stack:
+        if request.param == "memory":
+            yield MemoryTeam(stack)
+        else:
+            router = await stack.enter_async_context(await open_router(free_endpoint()))
+            yield ZenohTeam(stack, router.endpoint)
+
+
+@pytest.fixture
+def eventually() -> Callable[[Callable[[], Any]], Awaitable[None]]:
+    """Wait until a condition holds; the condition may be a coroutine function."""
+
+    async def wait(condition: Callable[[], Any]) -> None:
+        async with asyncio.timeout(PATIENCE):
+            while True:
+                holds = condition()
+                if await holds if asyncio.iscoroutine(holds) else holds:
+                    return
+                await asyncio.sleep(0.005)
+
+    return wait
+
+
+@pytest.fixture
+async def run_python() -> AsyncIterator[Callable[..., Awaitable[Process]]]:
+    """Start a Python program, given as text, with arguments; killed when the test is over."""
+    async with AsyncExitStack() as stack:
+        yield lambda program, *arguments: Process.start(stack, program, *arguments)
+
+
+@pytest.fixture
+def run_router(run_python: Callable[..., Awaitable[Process]]) -> Callable[[str], Awaitable[Process]]:
+    """Start a router in a process of its own; returns once it listens."""
+
+    async def run(endpoint: str) -> Process:
+        process = await run_python(ROUTER, endpoint)
+        assert await process.first_line() == "listening"
+        return process
+
+    return run

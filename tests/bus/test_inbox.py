@@ -1,0 +1,136 @@
+"""The queue between a bus's threads and the event loop."""
+
+import asyncio
+import logging
+import threading
+from collections.abc import Callable
+
+import pytest
+
+from lalliance_agents.bus.inbox import BATCH, CAPACITY, Inbox, Inlet
+
+
+class Turns:
+    """Stands for the event loop: what is scheduled runs when a test says so."""
+
+    def __init__(self) -> None:
+        self.scheduled = []
+
+    def wake(self, call: Callable[[], None]) -> None:
+        self.scheduled.append(call)
+
+    def turn(self) -> int:
+        now, self.scheduled = self.scheduled, []
+        for call in now:
+            call()
+        return len(now)
+
+
+def test_one_wake_up_per_batch_and_a_bounded_batch_per_turn() -> None:
+    turns, heard = Turns(), []
+    inbox = Inbox(turns.wake)
+    inlet = Inlet("x", heard.append)
+    for number in range(BATCH + 1):
+        inbox.push(inlet, number)
+    assert len(turns.scheduled) == 1
+    assert turns.turn() == 1
+    assert heard == list(range(BATCH))
+    assert turns.turn() == 1
+    assert heard == list(range(BATCH + 1))
+    assert turns.turn() == 0
+
+
+def test_a_flood_drops_the_oldest_but_nothing_that_must_be_kept() -> None:
+    turns, heard, dropped = Turns(), [], []
+    inbox = Inbox(turns.wake)
+    data = Inlet("data", heard.append, discard=dropped.append)
+    watch = Inlet("watch", heard.append, keep=True)
+    inbox.push(data, "first")
+    inbox.push(watch, "present")
+    for number in range(CAPACITY):
+        inbox.push(data, number)
+    assert (inbox.dropped_overflow, dropped) == (1, ["first"])
+    assert len(inbox) == CAPACITY + 1
+    while turns.turn():
+        pass
+    assert heard == ["present", *range(CAPACITY)]
+
+
+def test_what_waits_for_a_closed_registration_is_discarded() -> None:
+    turns, heard, discarded = Turns(), [], []
+    inbox = Inbox(turns.wake)
+    inlet = Inlet("x", heard.append, discard=discarded.append)
+    inbox.push(inlet, 1)
+    inlet.is_open = False
+    turns.turn()
+    inlet.is_open = True
+    inbox.push(inlet, 2)
+    inbox.close()
+    inbox.push(inlet, 3)
+    turns.turn()
+    assert (heard, discarded, len(inbox)) == ([], [1, 2, 3], 0)
+
+
+def test_a_failing_handler_is_logged_once_per_kind(caplog: pytest.LogCaptureFixture) -> None:
+    turns, failures = Turns(), [KeyError("a"), KeyError("b"), TypeError("c")]
+    inbox = Inbox(turns.wake)
+
+    def fail(number: int) -> None:
+        raise failures[number]
+
+    inlet = Inlet("the subscription 'k'", fail)
+    with caplog.at_level(logging.ERROR):
+        for number in range(3):
+            inbox.push(inlet, number)
+        turns.turn()
+    assert [record.exc_info[1] for record in caplog.records] == [failures[0], failures[2]]
+
+
+def test_an_exit_from_a_handler_leaves_the_rest_for_the_next_turn() -> None:
+    turns, heard = Turns(), []
+    inbox = Inbox(turns.wake)
+
+    def leave(_: int) -> None:
+        raise KeyboardInterrupt
+
+    inbox.push(Inlet("leave", leave), 0)
+    inbox.push(Inlet("x", heard.append), 1)
+    with pytest.raises(KeyboardInterrupt):
+        turns.turn()
+    turns.turn()
+    assert heard == [1]
+
+
+def test_a_closed_loop_is_not_the_sender_s_problem() -> None:
+    loop = asyncio.new_event_loop()
+    inbox = Inbox(loop.call_soon_threadsafe)
+    loop.close()
+    discarded = []
+    inbox.push(Inlet("x", print, discard=discarded.append), 1)
+    inbox.push(Inlet("x", print, discard=discarded.append), 2)
+    assert discarded == [1, 2]
+
+
+async def test_pushes_from_many_threads_all_arrive_in_each_thread_s_order() -> None:
+    heard, done = [], asyncio.Event()
+    inbox = Inbox(asyncio.get_running_loop().call_soon_threadsafe)
+    count = CAPACITY // 4
+
+    def hear(item: tuple[int, int]) -> None:
+        heard.append(item)
+        if len(heard) == 4 * count:
+            done.set()
+
+    inlet = Inlet("x", hear)
+    threads = [
+        threading.Thread(target=lambda who=who: [inbox.push(inlet, (who, number)) for number in range(count)])
+        for who in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    async with asyncio.timeout(20):
+        await done.wait()
+    for thread in threads:
+        thread.join()
+    for who in range(4):
+        assert [number for sender, number in heard if sender == who] == list(range(count))

@@ -1,0 +1,218 @@
+"""The world server: the asyncio shell around the world's core.
+
+It hears the robots' actions, decisions and counters and sees their presence, lets the world advance a few times a second, and
+publishes what changed: task states as sensory feedback, each body's state, events, and how the mission stands. What robots
+need to know is refreshed once a second and answered on query, so that a late or reconnected robot is not at a loss.
+"""
+
+import asyncio
+import logging
+from typing import Any
+
+from lalliance_agents.bus.base import Bus, Registration, Sample
+from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.clock import MissionClock
+from lalliance_agents.config import Mission
+from lalliance_agents.errors import MessageError
+from lalliance_agents.wire.keys import Key, Keys, Kind
+from lalliance_agents.wire.messages import Action, DecisionMade, LinkReport, Message
+from world_server.environments.base import TaskView
+from world_server.failures import Order
+from world_server.world import Happening, World
+
+_log = logging.getLogger(__name__)
+
+WORLD = "world"
+#: Time between two steps, in mission seconds, and at least in real ones.
+STEP = 0.05
+LEAST_STEP = 0.01
+REFRESH_PERIOD = 1.0
+STATUS_PERIOD = 0.25
+#: How long the world stays at the end for the robots' last reports, in real seconds.
+LINGER = 2.0
+
+
+class WorldServer:
+    """Serves one mission.
+
+    Args:
+        mission: a mission that passed `environments.check_options`.
+        bus: an open bus; the server does not close it.
+        incarnation: larger than that of any world server before it in this mission.
+        speed: mission seconds per real second.
+        patience: how long to wait for the whole team before beginning with a part of it, in real seconds.
+    """
+
+    def __init__(
+        self, mission: Mission, *, bus: Bus, incarnation: int, speed: float = 1.0, patience: float = 30.0
+    ) -> None:
+        self._mission = mission
+        self._bus = bus
+        self._speed = speed
+        self._patience = patience
+        self._clock = MissionClock(speed)
+        self._keys = Keys(mission.name)
+        self._messenger = Messenger(bus, self._keys, WORLD, incarnation, self._clock.now)
+        self._world = World(mission, self._clock.now(), self._tell)
+        self._published: dict[str, tuple[int, TaskView]] = {}
+        self._told_stage: tuple[str, int] | None = None
+        self._refresh_due = self._status_due = 0.0
+        self._ordered: dict[int, float] = {}
+
+    async def run(self) -> dict[str, Any]:
+        """Serve until the mission is over; its summary."""
+        watching: Registration | None = None
+        try:
+            await self._open()
+            watching = await self._bus.watch_presence(self._keys.build(Kind.ALIVE), self._see)
+            give_up_waiting = self._clock.now() + self._patience * self._speed
+            while not self._world.over:
+                now = self._clock.now()
+                missing = self._world.missing()
+                if not missing or (now >= give_up_waiting and len(missing) < len(self._world.bodies)):
+                    self._world.begin(now)
+                self._world.advance(now)
+                self._publish(now)
+                await self._clock.sleep_until(now + max(STEP, LEAST_STEP * self._speed))
+            await self._say_farewell()
+            return self._world.summary()
+        finally:
+            if watching is not None:
+                await watching.close()
+            await self._messenger.close()
+
+    async def _open(self) -> None:
+        keys, messenger = self._keys, self._messenger
+        await messenger.offer(keys.build(Kind.SENSE_TASK), self._answer_tasks)
+        await messenger.offer(keys.build(Kind.SENSE_ROBOT), self._answer_bodies)
+        for kind in (Kind.ACTION, Kind.DECISION, Kind.LINK):
+            await messenger.listen(keys.build(kind), self._receive)
+
+    async def _say_farewell(self) -> None:
+        """Tell everybody that the mission is over until all have reported for the last time, or the limit has passed."""
+        loop = asyncio.get_running_loop()
+        until = loop.time() + LINGER
+        while loop.time() < until and not self._all_reported():
+            self._publish_all(self._clock.now())
+            await asyncio.sleep(0.1)
+        self._publish_all(self._clock.now())
+
+    def _all_reported(self) -> bool:
+        there = [robot for robot, body in self._world.bodies.items() if body.present]
+        return all(self._world.ledger.has_final(robot) for robot in there)
+
+    def _see(self, key: str, present: bool) -> None:
+        try:
+            parsed = self._keys.parse(key)
+        except MessageError as error:
+            self._messenger.drop(error.reason, key, str(error))
+            return
+        if parsed.kind is Kind.ALIVE and parsed.robot is not None:
+            self._world.presence(parsed.robot, present, self._clock.now())
+
+    def _receive(self, _: Key, message: Message) -> None:
+        match message:
+            case Action():
+                self._world.act(message, self._clock.now())
+            case DecisionMade():
+                self._world.decided(message, self._clock.now())
+            case LinkReport() if message.sender in self._world.bodies:
+                self._world.ledger.reported(message)
+            case _:
+                self._messenger.drop("stranger", message.sender)
+
+    def _tell(self, happening: Happening) -> None:
+        _log.info("%.1f s %s", happening.elapsed, happening.text)
+        self._send_event(
+            happening.kind, happening.text, happening.elapsed, robot=happening.robot, task=happening.task, details={}
+        )
+
+    def _send_event(self, kind: str, text: str, elapsed: float, **fields: Any) -> None:
+        self._messenger.send(
+            Kind.EVENT, kind=kind, text=text, elapsed=max(elapsed, 0.0), trial=self._world.trial, **fields
+        )
+
+    def _order(self, order: Order, now: float) -> None:
+        """Ask whoever holds the processes; again each second, until it is seen to be done."""
+        if now - self._ordered.get(order.number, -REFRESH_PERIOD) >= REFRESH_PERIOD:
+            self._ordered[order.number] = now
+            text = f"{order.deed} {order.robot}: {order.because}"
+            details = {"deed": order.deed.value, "number": order.number}
+            self._send_event("order", text, self._world.elapsed, robot=order.robot, details=details)
+
+    def _publish(self, now: float) -> None:
+        for order in self._world.orders():
+            self._order(order, now)
+        stage = (self._world.stage.value, self._world.trial)
+        if now >= self._refresh_due or stage != self._told_stage:
+            self._told_stage = stage
+            self._refresh_due = now + REFRESH_PERIOD
+            self._publish_all(now)
+            return
+        for task, view in self._world.tasks().items():
+            before = self._published.get(task)
+            if before is None or (before[1].complete, before[1].applicable) != (view.complete, view.applicable):
+                self._publish_task(task, view)
+        if now >= self._status_due:
+            self._publish_status(now)
+
+    def _publish_all(self, now: float) -> None:
+        for robot in self._world.bodies:
+            self._messenger.send(Kind.SENSE_ROBOT, key_robot=robot, **self._body_fields())
+        for task, view in self._world.tasks().items():
+            self._publish_task(task, view)
+        self._publish_status(now)
+
+    def _publish_task(self, task: str, view: TaskView) -> None:
+        self._published[task] = (self._world.trial, view)
+        self._messenger.send(Kind.SENSE_TASK, key_task=task, **self._task_fields(view))
+
+    def _publish_status(self, now: float) -> None:
+        self._status_due = now + STATUS_PERIOD
+        world = self._world
+        tasks = world.tasks()
+        self._messenger.send(
+            Kind.STATUS,
+            mission=world.stage.value,
+            trial=world.trial,
+            trials=world.trials_planned,
+            learning=world.learning,
+            elapsed=max(world.elapsed, 0.0),
+            tasks={
+                task: {"complete": view.complete, "applicable": view.applicable, "progress": view.progress}
+                for task, view in tasks.items()
+            },
+            robots={robot: {"present": body.present, "task": body.task} for robot, body in world.bodies.items()},
+        )
+
+    def _task_fields(self, view: TaskView) -> dict[str, Any]:
+        return {
+            "trial": self._world.trial,
+            "learning": self._world.learning,
+            "applicable": view.applicable,
+            "complete": view.complete,
+            "progress": min(max(view.progress, 0.0), 1.0),
+        }
+
+    def _body_fields(self) -> dict[str, Any]:
+        return {"mission": self._world.stage.value, "trial": self._world.trial, "learning": self._world.learning}
+
+    def _answer_tasks(self, _: str) -> list[Sample]:
+        self._world.advance(self._clock.now())
+        return [
+            Sample(
+                self._keys.build(Kind.SENSE_TASK, task=task),
+                self._messenger.compose(Kind.SENSE_TASK, **self._task_fields(view)),
+            )
+            for task, view in self._world.tasks().items()
+        ]
+
+    def _answer_bodies(self, query: str) -> list[Sample]:
+        robots = [robot for robot in self._world.bodies if query == self._keys.build(Kind.SENSE_ROBOT, robot=robot)]
+        return [
+            Sample(
+                self._keys.build(Kind.SENSE_ROBOT, robot=robot),
+                self._messenger.compose(Kind.SENSE_ROBOT, **self._body_fields()),
+            )
+            for robot in robots
+        ]

@@ -1,0 +1,275 @@
+"""The world's core: tasks, bodies, trials and faults, moved by whoever hands in the time.
+
+The world waits until its team is there, runs the trials of the mission one after the other, and ends complete or failed.
+A body works on what its robot last said, only while that is refreshed (dead-man switch) and its process is present. Nothing
+here waits, sends or reads a clock: the server and the simulator both drive it, and tell others what it returns.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from lalliance_agents.config import Mission, Phase
+from lalliance_agents.wire.messages import Action, DecisionMade
+from world_server import environments
+from world_server.environments.base import Environment, TaskView, Work
+from world_server.failures import Failures, Order
+from world_server.ledger import Ledger
+
+#: A body stops when its action was not refreshed for this long, in seconds.
+DEAD_MAN = 2.5
+#: Time between two trials, in seconds: everybody can sense the end of the one before the next begins.
+TRIAL_PAUSE = 1.0
+
+
+class Stage(StrEnum):
+    """How the mission stands; the words of the messages."""
+
+    WAITING = "waiting"
+    RUNNING = "running"
+    COMPLETE = "complete"
+    FAILED = "failed"
+
+
+@dataclass(slots=True)
+class Body:
+    """What the world knows of one robot."""
+
+    present: bool = False
+    task: str | None = None
+    refreshed: float = -math.inf
+    fewest: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """Something worth telling."""
+
+    kind: str
+    text: str
+    elapsed: float
+    robot: str | None = None
+    task: str | None = None
+
+
+class World:
+    """One mission's world.
+
+    Args:
+        mission: a mission that passed `environments.check_options`.
+        now: the present instant, in seconds.
+        tell: called with everything that happens, as it happens.
+    """
+
+    def __init__(self, mission: Mission, now: float, tell: Callable[[Happening], None]) -> None:
+        self.mission = mission
+        self.stage = Stage.WAITING
+        self.trial = 0
+        self.bodies = {robot: Body() for robot in mission.robots}
+        self.ledger = Ledger(list(mission.tasks))
+        self.failures = Failures(mission)
+        self.trials_planned = sum(phase.trials for phase in mission.phases)
+        self._tell = tell
+        self._now = now
+        self._began = now
+        self._pause_until: float | None = None
+        self._phases = [phase for phase in mission.phases for _ in range(phase.trials)]
+        self._phase: Phase = self._phases[0]
+        self._environment = self._fresh_environment()
+        self._orders: dict[int, Order] = {}
+        self.makespan: float | None = None
+
+    def __repr__(self) -> str:
+        return f"<World {self.mission.name}: {self.stage}, trial {self.trial}, {self.elapsed:.1f} s>"
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the trial began, in seconds."""
+        return self._now - self._began if self.trial else 0.0
+
+    @property
+    def learning(self) -> str:
+        """The control phase of the trial."""
+        return self._phase.learning.value
+
+    @property
+    def live(self) -> bool:
+        """Whether this is the last trial, in which faults happen."""
+        return self.trial > 0 and not self._phases
+
+    @property
+    def over(self) -> bool:
+        """Whether the mission has ended."""
+        return self.stage in {Stage.COMPLETE, Stage.FAILED}
+
+    def missing(self) -> list[str]:
+        """The robots that should be there from the beginning, and are not."""
+        return [
+            robot for robot, body in self.bodies.items() if not body.present and self.mission.robots[robot].joins == 0
+        ]
+
+    def _fresh_environment(self) -> Environment:
+        seed = np.random.SeedSequence([self.mission.seed, self.trial]).generate_state(1, np.uint64)[0]
+        return environments.create(self.mission, seed=int(seed))
+
+    def _report(self, kind: str, text: str, *, robot: str | None = None, task: str | None = None) -> None:
+        self._tell(Happening(kind, text, self.elapsed, robot, task))
+
+    def begin(self, now: float) -> None:
+        """Start the first trial, with whoever is there."""
+        self.advance(now)
+        if self.stage is Stage.WAITING:
+            if self.missing():
+                self._report("warning", f"beginning without {', '.join(self.missing())}")
+            self.stage = Stage.RUNNING
+            self._next_trial()
+
+    def _next_trial(self) -> None:
+        self._phase = self._phases.pop(0)
+        self.trial += 1
+        self._began = self._now
+        self._pause_until = None
+        self._environment = self._fresh_environment()
+        self.ledger.new_trial()
+        for body in self.bodies.values():
+            body.task = None
+        self._report("trial", f"trial {self.trial} begins ({self.learning} learning)")
+
+    def presence(self, robot: str, present: bool, now: float) -> None:
+        """A robot's process came or went."""
+        self.advance(now)
+        body = self.bodies.get(robot)
+        if body is None or body.present == present:
+            return
+        body.present = present
+        if self.over:
+            return
+        if self.live:
+            self.failures.presence(robot, present, self.elapsed)
+        if present:
+            self.ledger.returned(robot)
+            self._report("present", f"{robot} is there", robot=robot)
+        else:
+            body.task = None
+            self.ledger.failed(robot, self.elapsed)
+            self._report("gone", f"{robot} is gone", robot=robot)
+
+    def act(self, action: Action, now: float) -> None:
+        """A robot's body is to work on a task, or on none."""
+        self.advance(now)
+        body = self.bodies.get(action.sender)
+        if body is None:
+            return
+        body.fewest = action.fewest
+        body.refreshed = now
+        if action.trial == self.trial and action.task != body.task:
+            body.task = action.task
+            if action.task is not None:
+                self.ledger.began(action.sender, action.task, self.elapsed)
+            self._environment.step(0.0, self._actions())
+
+    def decided(self, made: DecisionMade, now: float) -> None:
+        """A robot reports a decision."""
+        self.advance(now)
+        if made.trial != self.trial or made.sender not in self.bodies:
+            return
+        takeover = self.ledger.decided(made, self.elapsed)
+        if takeover is not None:
+            self._report(
+                "takeover",
+                f"{takeover['to']} takes {takeover['task']} from {takeover['from']} ({takeover['cause']})",
+                robot=made.sender,
+                task=made.task,
+            )
+
+    def advance(self, now: float) -> None:
+        """Let time pass until `now`; an instant that has passed already changes nothing."""
+        while self.stage is Stage.RUNNING and self._now < now:
+            until = min(now, self._next_instant())
+            if self._pause_until is None:
+                self._work(until)
+            else:
+                self._now = until
+                if until >= self._pause_until:
+                    self._next_trial()
+        self._now = max(self._now, now)
+
+    def _next_instant(self) -> float:
+        """The next instant at which something other than work changes."""
+        if self._pause_until is not None:
+            return self._pause_until
+        ends = [body.refreshed + DEAD_MAN for body in self.bodies.values() if body.task is not None]
+        ends.append(self._began + self.mission.deadline)
+        return min((end for end in ends if end > self._now), default=math.inf)
+
+    def _actions(self) -> dict[str, Work]:
+        return {
+            robot: Work(body.task)
+            for robot, body in self.bodies.items()
+            if body.task is not None and body.present and self._now < body.refreshed + DEAD_MAN
+        }
+
+    def _work(self, until: float) -> None:
+        actions = self._actions()
+        for done in self._environment.step(until - self._now, actions):
+            at = self._now + done.after - self._began
+            self.ledger.completed(done.task, done.by, at)
+            text = f"{done.task} completed by {' and '.join(done.by)}"
+            self._tell(Happening("complete", text, at, done.by[0] if done.by else None, done.task))
+        self._now = until
+        if all(view.complete for view in self.tasks().values()):
+            self._end_trial()
+        elif self.elapsed >= self.mission.deadline - 1e-9:
+            self._end(Stage.FAILED, f"not complete by the deadline of {self.mission.deadline:g} s")
+
+    def _end_trial(self) -> None:
+        done = [task["completed_at"] for task in self.ledger.summary()["tasks"].values()]
+        self.makespan = max(done)
+        self.ledger.trials.append(self.makespan)
+        while self._phases and self._phase.until == "full" and self.full and self._phases[0] is self._phase:
+            self._phases.pop(0)
+        if self._phases:
+            self._pause_until = self._now + TRIAL_PAUSE
+            self._report("trial", f"trial {self.trial} complete after {self.makespan:.1f} s")
+        else:
+            self._end(Stage.COMPLETE, f"complete after {self.makespan:.1f} s")
+
+    def _end(self, stage: Stage, text: str) -> None:
+        self.stage = stage
+        if stage is Stage.FAILED:
+            self.makespan = None
+        self._report(stage.value, text)
+
+    @property
+    def full(self) -> bool:
+        """Whether the monitors of every robot that is there hold all the samples they keep."""
+        there = [robot for robot, body in self.bodies.items() if body.present]
+        return all(self.bodies[robot].fewest >= self.mission.parameters_of(robot).trials for robot in there)
+
+    def orders(self) -> list[Order]:
+        """Deeds at processes that are due and not confirmed."""
+        return self.failures.orders(self.elapsed) if self.live and self.stage is Stage.RUNNING else []
+
+    def tasks(self) -> dict[str, TaskView]:
+        """What every task looks like to the robots now: before the first trial and between trials, nothing is to do."""
+        views = dict(self._environment.sense())
+        if self.stage is Stage.RUNNING:
+            return views
+        return {task: TaskView(view.complete, applicable=False, progress=view.progress) for task, view in views.items()}
+
+    def summary(self) -> dict[str, Any]:
+        """How the mission went, as plain data."""
+        return {
+            "mission": self.mission.name,
+            "complete": self.stage is Stage.COMPLETE,
+            "makespan": self.makespan,
+            "seed": self.mission.seed,
+            "trials": self.ledger.trials,
+            "knowledge": {robot: body.fewest for robot, body in self.bodies.items()},
+            "faults": self.failures.report(),
+            **self.ledger.summary(),
+        }
