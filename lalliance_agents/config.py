@@ -27,11 +27,6 @@ ENVIRONMENT_PATTERN = f"^{_DOTTED}(:{_DOTTED})?$"
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 """Robots, tasks and missions: 1 to 64 of A-Z a-z 0-9 _ -, because they become chunks of keys."""
 
-#: Longest time a mission may name, in seconds (thirty years): sums of a few such times stay finite and exact.
-LONGEST = 1e9
-Duration = Annotated[Positive, Field(le=LONGEST)]
-Instant = Annotated[NotNegative, Field(le=LONGEST)]
-
 
 def misplaced(path: Sequence[str | int], message: str, errors: Sequence[ErrorDetails] = ()) -> PydanticCustomError:
     """An error that a validator of the whole mission found at the place `path` of the file.
@@ -71,16 +66,16 @@ class TaskSpec(Record):
 
     after: tuple[Name, ...] = ()
     """Tasks that must be complete before this one can be worked on."""
-    arrives: Instant = 0.0
+    arrives: NotNegative = 0.0
     """When the task comes into being, in seconds after the trial's start."""
 
 
 class RobotSpec(Record):
     """One robot of the team."""
 
-    tasks: Annotated[dict[Name, Duration], Field(min_length=1)]
+    tasks: Annotated[dict[Name, Positive], Field(min_length=1)]
     """The tasks it can do, each with the time it needs alone, in seconds."""
-    joins: Instant = 0.0
+    joins: NotNegative = 0.0
     """When its process is started, in seconds after the live trial's start; 0: from the beginning."""
     behaviors: Annotated[str, Field(pattern=FACTORY_PATTERN)] | None = None
     """`package.module:factory` of behaviour sets of one's own; the default lets the world's body do the work."""
@@ -114,11 +109,11 @@ class CrashFault(Record):
     """`crash`."""
     robot: Name
     """Whose process."""
-    at: Instant
+    at: NotNegative
     """When, in seconds after the live trial's start."""
     restart: bool = False
     """Whether the process is started again, with a new incarnation and the learned times it had stored."""
-    until: Duration | None = None
+    until: Positive | None = None
     """When it is started again; default: 5 seconds after `at`."""
 
     @property
@@ -158,7 +153,7 @@ class Mission(Record):
     """What robots know before the first trial: nothing, or the true times of all who share their tasks."""
     control_period: Annotated[float, Field(ge=0.001, le=10, allow_inf_nan=False)] = 0.1
     """Time between two control steps of a robot, in seconds."""
-    deadline: Duration = 600.0
+    deadline: Positive = 600.0
     """A trial that is not complete after this many seconds has failed."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """All randomness of a run comes from this number."""

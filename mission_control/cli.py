@@ -79,8 +79,12 @@ def run(
     plan = Plan(path.resolve(), mission, speed, connect, listen, None if learned is None else learned.resolve())
     for warning in mission.warnings():
         _warn(f"{path}: {warning}")
-    with _view(mission, console, plain=plain) as view:
-        summary = _run_until_told(Launcher(plan, view).run())
+
+    async def launch() -> dict[str, Any]:
+        with _view(mission, console, plain=plain) as view:
+            return await Launcher(plan, view).run()
+
+    summary = _run_until_told(launch())
     if as_json:
         typer.echo(json.dumps(summary))
     else:

@@ -16,6 +16,7 @@ from lalliance_agents.bus.base import Bus
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.bus.zenoh_bus import open_bus
+from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import BusError, LallianceError
 from lalliance_agents.wire.keys import Key, Keys, Kind
@@ -80,6 +81,7 @@ class Launcher:
     def __init__(self, plan: Plan, view: Lines) -> None:
         self._plan = plan
         self._view = view
+        self._clock = MissionClock(plan.speed)
         self._endpoint = plan.connect or plan.listen or free_endpoint()
         self._router: Child | None = None
         self._robots: dict[str, Child] = {}
@@ -113,8 +115,7 @@ class Launcher:
 
     async def _watch(self, bus: Bus) -> Messenger:
         keys = Keys(self._plan.mission.name)
-        loop = asyncio.get_running_loop()
-        messenger = Messenger(bus, keys, OPERATOR, 1, loop.time)
+        messenger = Messenger(bus, keys, OPERATOR, 1, self._clock.now)
         for kind in (Kind.EVENT, Kind.STATUS, Kind.DECISION, Kind.MOTIVATION):
             await messenger.listen(keys.build(kind), self._take)
         return messenger
@@ -122,7 +123,7 @@ class Launcher:
     def _take(self, _: Key, message: Message) -> None:
         if isinstance(message, Event) and message.kind == "order":
             self._carry_out(message)
-        self._view.take(message)
+        self._view.take(message, self._clock.now())
 
     def _carry_out(self, order: Event) -> None:
         """Do what the world orders, each order once."""

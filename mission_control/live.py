@@ -41,9 +41,9 @@ class Lines:
     ) -> None:
         pass
 
-    def take(self, message: Message) -> None:
-        """Show a message of the mission."""
-        line = self._picture.take(message)
+    def take(self, message: Message, now: float) -> None:
+        """Show a message of the mission that came at `now`."""
+        line = self._picture.take(message, now)
         if line is not None:
             self._console.print(line, highlight=False, markup=False, soft_wrap=True)
 
@@ -74,9 +74,9 @@ class LiveView(Lines):
     ) -> None:
         self._live.__exit__(kind, error, trace)
 
-    def take(self, message: Message) -> None:
+    def take(self, message: Message, now: float) -> None:
         """Put a message into the picture; it shows at the next redraw."""
-        self._picture.take(message)
+        self._picture.take(message, now)
 
     def say(self, text: str) -> None:
         """Show a remark among the events."""

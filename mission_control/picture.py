@@ -17,29 +17,29 @@ class Picture:
     """The latest of everything."""
 
     status: Status | None = None
+    lead: float = 0.0
+    """How far the time since the trial began is ahead of the operator's own mission time, in seconds."""
     motivations: dict[str, Motivations] = field(default_factory=dict)
     events: deque[str] = field(default_factory=lambda: deque(maxlen=KEPT_EVENTS))
 
-    def take(self, message: Message) -> str | None:
-        """Put a message into the picture; the line it adds to the events, if any."""
+    def take(self, message: Message, now: float) -> str | None:
+        """Put a message that came at `now` into the picture; the line it adds to the events, if any."""
         line = None
         match message:
             case Status():
                 self.status = message
+                self.lead = message.elapsed - now
             case Motivations():
                 self.motivations[message.sender] = message
             case Event() if message.kind != "order" or message.details.get("deed") == "kill":
                 line = f"{message.elapsed:7.1f} s  {message.text}"
             case DecisionMade():
-                line = f"{self._elapsed():7.1f} s  {describe(message)}"
+                line = f"{max(now + self.lead, 0.0):7.1f} s  {describe(message)}"
             case _:
                 pass
         if line is not None:
             self.events.append(line)
         return line
-
-    def _elapsed(self) -> float:
-        return self.status.elapsed if self.status else 0.0
 
     def working(self, task: str) -> list[str]:
         """The robots whose bodies work on `task`."""
@@ -59,7 +59,7 @@ def _number(value: object) -> float:
 
 _REASONS = {
     "free": "nobody is on it",
-    "silence": "{other} is silent",
+    "silence": "{other} is not heard any more",
     "impatience": "patience with {other} has ended",
     "released": "{other} has left it",
     "contender": "to {other}, after {active:.1f} s",

@@ -62,12 +62,13 @@ class Ledger:
     def decided(self, made: DecisionMade, at: float) -> dict[str, Any] | None:
         """A robot reported a decision; the takeover that it is, if it is one.
 
-        A takeover is an activation on a task that another robot was known to have been on, and had been on indeed.
+        A takeover is an activation on a task that another robot was known to have been on, and had been on indeed since
+        the one who takes it had it last.
         """
         record = self._tasks.get(made.task)
         if record is None or made.verb != "activate" or made.cause not in _TAKEOVERS:
             return None
-        if made.other is None or all(robot != made.other for robot, _ in record.attempts):
+        if made.other is None or not _had_it_last(record.attempts, made.other, made.sender):
             return None
         takeover = {
             "task": made.task,
@@ -118,6 +119,16 @@ class Ledger:
                 "missed": sum(report.missed for report in self._links.values()),
             },
         }
+
+
+def _had_it_last(attempts: list[tuple[str, float]], other: str, sender: str) -> bool:
+    """Whether `other` began the task after all but the present attempt of `sender`, which is its latest."""
+    order = [robot for robot, _ in attempts]
+    if other not in order:
+        return False
+    latest_of_other = len(order) - 1 - order[::-1].index(other)
+    own = [index for index, robot in enumerate(order) if robot == sender]
+    return all(index < latest_of_other for index in own[:-1])
 
 
 def _detected_at(made: DecisionMade, at: float) -> float | None:

@@ -157,6 +157,7 @@ class World:
             body.task = None
             self.ledger.failed(robot, self.elapsed)
             self._report("gone", f"{robot} is gone", robot=robot)
+            self._rest()
 
     def act(self, action: Action, now: float) -> None:
         """A robot's body is to work on a task, or on none."""
@@ -170,7 +171,7 @@ class World:
             body.task = action.task
             if action.task is not None:
                 self.ledger.began(action.sender, action.task, self.elapsed)
-            self._environment.step(0.0, self._actions())
+            self._rest()
 
     def decided(self, made: DecisionMade, now: float) -> None:
         """A robot reports a decision."""
@@ -212,6 +213,11 @@ class World:
             for robot, body in self.bodies.items()
             if body.task is not None and body.present and self._now < body.refreshed + DEAD_MAN
         }
+
+    def _rest(self) -> None:
+        """Let the environment know at once who works on what, so that no change is lost between two steps."""
+        if self.stage is Stage.RUNNING and self._pause_until is None:
+            self._work(self._now)
 
     def _work(self, until: float) -> None:
         actions = self._actions()

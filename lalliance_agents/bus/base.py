@@ -26,10 +26,6 @@ class Sample:
     payload: bytes
 
 
-#: Larger payloads, in bytes, are dropped and counted by whoever receives them.
-MAX_PAYLOAD = 64 * 1024
-
-
 class Delivery(StrEnum):
     """How much a message matters, from the most urgent down."""
 
@@ -88,7 +84,8 @@ class Bus(Protocol):
     async def watch_presence(self, pattern: str, handler: PresenceHandler) -> Registration:
         """Have `handler` called with (key, True) for each presence there is or comes, and (key, False) when it is gone.
 
-        Several announcements of one key are one presence, gone with the last. While the bus is down, all are gone.
+        Several announcements of one key are one presence, gone with the last; a watcher that is itself one of the
+        announcers may see it flicker meanwhile. While the bus is down, all are gone.
         """
 
     async def close(self) -> None:

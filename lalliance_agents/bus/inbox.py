@@ -13,8 +13,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
-from lalliance_agents.bus.base import MAX_PAYLOAD, Answer, Sample
+from lalliance_agents.bus.base import Answer, Sample
 from lalliance_agents.bus.patterns import check_key, matches
+from lalliance_agents.wire.messages import MAX_PAYLOAD
 
 #: Messages handled in one turn of the loop.
 BATCH = 256

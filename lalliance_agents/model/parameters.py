@@ -113,8 +113,10 @@ def _by_name(kind: type[IntEnum]) -> Any:
 
 StrategyField = Annotated[Strategy, *_by_name(Strategy)]
 OrderingField = Annotated[Ordering, *_by_name(Ordering)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+#: Largest number that a mission may give for a time, a rate or a level: larger ones lose their fractions.
+LARGEST = 1e9
+Positive = Annotated[float, Field(gt=0, le=LARGEST, strict=True, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, strict=True, allow_inf_nan=False)]
 
 
 class Record(BaseModel):

@@ -16,8 +16,8 @@ from lalliance_agents.wire.keys import NAME_PATTERN, Key, Kind
 
 VERSION: Literal[1] = 1
 
-#: Larger messages are dropped unread, in bytes.
-MAX_SIZE = 64 * 1024
+#: Larger messages are dropped unread, in bytes: room for the status of a mission with some thousand tasks.
+MAX_PAYLOAD = 256 * 1024
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
@@ -188,8 +188,8 @@ def decode(kind: type[M], payload: bytes) -> M:
     Raises:
         MessageError: the payload is too large, no msgpack, of another version, or not a valid `kind`; nothing else.
     """
-    if len(payload) > MAX_SIZE:
-        raise MessageError("size", f"{len(payload)} bytes, more than {MAX_SIZE}")
+    if len(payload) > MAX_PAYLOAD:
+        raise MessageError("size", f"{len(payload)} bytes, more than {MAX_PAYLOAD}")
     document = _unpack(payload)
     if not isinstance(document, dict):
         raise MessageError("form", "not a map")

@@ -8,18 +8,22 @@ polls what no event reports.
 import asyncio
 import signal
 import sys
+import threading
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack
 from typing import Any, Self
 
 import pytest
 
-from lalliance_agents.bus.base import Bus
+from lalliance_agents.bus.base import Bus, Delivery
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.router import free_endpoint, open_router
 from lalliance_agents.bus.zenoh_bus import open_bus
 
 PATIENCE = 20.0
+
+#: Published by `linked` until it is heard; an `Ear` does not keep it.
+READY = b"ready?"
 
 MORTAL = """
 import asyncio, sys
@@ -112,6 +116,54 @@ class ZenohTeam:
         return (await Process.start(self._stack, MORTAL, self.endpoint, key)).kill
 
 
+class Ear:
+    """A handler that remembers all but `READY`, and in which thread it was called."""
+
+    def __init__(self):
+        self.ready = set()
+        self.samples = []
+        self.threads = set()
+        self._grown = asyncio.Event()
+
+    def __call__(self, sample):
+        if sample.payload == READY:
+            self.ready.add(sample.key)
+            return
+        self.samples.append(sample)
+        self.threads.add(threading.get_ident())
+        self._grown.set()
+
+    @property
+    def payloads(self):
+        return [sample.payload for sample in self.samples]
+
+    async def until(self, payload):
+        async with asyncio.timeout(PATIENCE):
+            while all(sample.payload != payload for sample in reversed(self.samples)):
+                self._grown.clear()
+                await self._grown.wait()
+
+
+class Watch:
+    """A presence handler that remembers."""
+
+    def __init__(self):
+        self.news = []
+        self.threads = set()
+        self._grown = asyncio.Event()
+
+    def __call__(self, key, present):
+        self.news.append((key, present))
+        self.threads.add(threading.get_ident())
+        self._grown.set()
+
+    async def until(self, *news):
+        async with asyncio.timeout(PATIENCE):
+            while tuple(self.news[-len(news) :]) != news:
+                self._grown.clear()
+                await self._grown.wait()
+
+
 @pytest.fixture(params=["memory", "zenoh"])
 async def team(request: pytest.FixtureRequest) -> AsyncIterator[MemoryTeam | ZenohTeam]:
     async with AsyncExitStack() as stack:
@@ -154,3 +206,44 @@ def run_router(run_python: Callable[..., Awaitable[Process]]) -> Callable[[str],
         return process
 
     return run
+
+
+@pytest.fixture
+def linked(eventually):
+    """Wait until what `bus` puts on `key` is heard by `ear`."""
+
+    async def link(bus, key, ear):
+        def heard():
+            bus.put(key, READY, Delivery.STATE)
+            return key in ear.ready
+
+        await eventually(heard)
+
+    return link
+
+
+@pytest.fixture
+def asked(eventually):
+    """Ask until `count` answers come; return the payloads, sorted."""
+
+    async def ask(bus, pattern, count, payload=b""):
+        replies = []
+
+        async def enough():
+            replies[:] = await bus.query(pattern, payload, timeout=PATIENCE)
+            return len(replies) == count
+
+        await eventually(enough)
+        return sorted((reply.key, reply.payload) for reply in replies)
+
+    return ask
+
+
+@pytest.fixture
+def make_ear():
+    return Ear
+
+
+@pytest.fixture
+def make_watch():
+    return Watch

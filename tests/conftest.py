@@ -1,0 +1,15 @@
+"""Which event loop a test runs in: one with virtual time if it asks for it, else a real one."""
+
+import asyncio
+from collections.abc import Callable, Mapping
+
+import pytest
+from support.virtual_time import VirtualTimeLoop
+
+
+def pytest_asyncio_loop_factories(
+    config: pytest.Config, item: pytest.Item
+) -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
+    if item.get_closest_marker("virtual_time"):
+        return {"virtual": VirtualTimeLoop}
+    return {"real": asyncio.new_event_loop}
