@@ -168,7 +168,7 @@ def robot(
 ) -> None:
     """Run one robot of a mission until the mission is over."""
     _follow(parent)
-    mission = _load(path, seed)
+    mission = _load(path, seed, whole=False)
     if name not in mission.robots:
         raise UserError(f"{path}: no robot {name!r} in this mission; expected one of {', '.join(mission.robots)}")
 
@@ -219,10 +219,12 @@ def schema() -> None:
     typer.echo(json.dumps(mission_schema(), indent=2))
 
 
-def _load(path: Path, seed: int | None) -> "Mission":
-    """The checked mission at `path`, with the environment's options checked too."""
-    from mission_control.missions import load
-
+def _load(path: Path, seed: int | None, *, whole: bool = True) -> "Mission":
+    """The checked mission at `path`; as a `whole`, with the environment's options, which are no business of a robot's."""
+    if whole:
+        from mission_control.missions import load
+    else:
+        from lalliance_agents.mission_file import load_mission as load
     mission = load(path)
     return mission if seed is None else mission.model_copy(update={"seed": seed})
 

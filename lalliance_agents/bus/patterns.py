@@ -44,7 +44,7 @@ def _check(text: str, grammar: re.Pattern[str], kind: str) -> None:
         raise ValueError(f"{text!r} is not a {kind}: expected chunks joined by single slashes, without $, # and ?")
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=2**17)
 def matches(pattern: str, key: str) -> bool:
     """Whether `pattern` matches `key`, which holds no wildcard."""
     return intersects(pattern, key)

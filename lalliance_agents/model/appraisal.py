@@ -148,7 +148,7 @@ class Appraisal:
         parameters = self._parameters
         if not self._learns:
             return parameters.for_set(one.task).fast_rate
-        low, high = self._knowledge.span(own_time)
+        low, high = self._knowledge.span()
         wait = equations.delay(
             parameters.ordering,
             category,

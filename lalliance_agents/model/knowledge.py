@@ -2,7 +2,8 @@
 
 Here stands what replaces an unknown time (erratum 10): the robot's own unknown time is the largest it knows of, or
 `initial_task_time` where it knows nothing; a teammate's unknown time is left out. `low` and `high` range over every robot
-and task known, for tasks this robot can do.
+and task known, for tasks this robot can do, and over the robot's own times as replaced: or a robot that knows nothing but
+that it failed at one task would want it as much as another.
 """
 
 import math
@@ -30,6 +31,7 @@ class Knowledge:
         self.monitors = {task: Monitor(me, parameters) for task in tasks}
         self._seen = -1
         self._low = self._high = math.nan
+        self._fallback = parameters.initial_task_time
         self._knows_teammates = False
 
     def _read(self) -> None:
@@ -38,8 +40,10 @@ class Knowledge:
             return
         self._seen = seen
         known = [(robot, time) for monitor in self.monitors.values() for robot, time in monitor.times()]
-        self._low = min((time for _, time in known), default=math.nan)
-        self._high = max((time for _, time in known), default=math.nan)
+        self._fallback = max((time for _, time in known), default=self._parameters.initial_task_time)
+        times = [time for _, time in known] + [self.own_time(task) for task in self.monitors]
+        self._low = min((time for time in times if not math.isnan(time)), default=math.nan)
+        self._high = max((time for time in times if not math.isnan(time)), default=math.nan)
         self._knows_teammates = any(robot != self._me for robot, _ in known)
 
     def own_time(self, task: str) -> float:
@@ -51,8 +55,7 @@ class Knowledge:
         if self._undefined_if_unknown:
             return math.nan
         self._read()
-        fallback = self._parameters.initial_task_time if math.isnan(self._high) else self._high
-        return max(fallback, monitor.floor(self._me))
+        return max(self._fallback, monitor.floor(self._me))
 
     def best_time(self, task: str, present: Sequence[str]) -> float:
         """The least task time of the robots present, this one included (erratum 3), in seconds; else infinity."""
@@ -68,12 +71,10 @@ class Knowledge:
         """task_time_i(k, j, t) in seconds; None if unknown."""
         return self.monitors[task].task_time(robot)
 
-    def span(self, own_time: float) -> tuple[float, float]:
-        """`low` and `high` over all that is known, widened to `own_time`, in seconds."""
+    def span(self) -> tuple[float, float]:
+        """`low` and `high` over all that is known, in seconds; NaN where nothing is."""
         self._read()
-        if math.isnan(self._low):
-            return own_time, own_time
-        return min(self._low, own_time), max(self._high, own_time)
+        return self._low, self._high
 
     def scale(self, low: float, high: float) -> float:
         """The scale factor of the delays."""

@@ -35,7 +35,7 @@ from lalliance_agents.model.motivation import Motivation
 from lalliance_agents.model.parameters import SLACK, Architecture, Erratum, Learning, Parameters
 
 #: Ends of an attempt after which the robot is not held to have failed.
-_BLAMELESS = {Cause.COLLISION, Cause.INAPPLICABLE, Cause.NEW_TRIAL}
+_BLAMELESS = {Cause.COLLISION, Cause.INAPPLICABLE, Cause.NEW_TRIAL, Cause.NOT_BEST, Cause.SUPPRESSED}
 
 _VERBS = {
     Cause.SENSED: Verb.COMPLETE,

@@ -116,11 +116,11 @@ class Monitor:
         self._attempts[self._me] = _Attempt(now, now, 0.0)
 
     def ceased(self, now: float, *, failed: bool) -> None:
-        """The robot itself ends its attempt, and the task is not complete."""
+        """The robot itself ends its attempt, and the task is not complete; it knows why, however short the attempt was."""
         attempt = self._attempts.get(self._me)
         if attempt is not None:
             attempt.last = now
-            self._fail(self._me, attempt, failed=failed)
+            self._fail(self._me, attempt, failed=failed, short=not failed)
 
     def interrupted(self, now: float) -> None:
         """The task cannot be worked on just now: attempts end, and nobody has failed."""
@@ -151,11 +151,11 @@ class Monitor:
         candidates = lasting or list(self._attempts)
         return candidates[0] if len(candidates) == 1 and self._earlier == 0 else None
 
-    def _fail(self, robot: str, attempt: _Attempt, *, failed: bool = True) -> None:
-        """End an attempt without completion; one that ended in a collision is as if it had never been."""
+    def _fail(self, robot: str, attempt: _Attempt, *, failed: bool = True, short: bool = True) -> None:
+        """End an attempt without completion; a `short` one that may have ended in a collision is as if it had never been."""
         del self._attempts[robot]
         elapsed = attempt.last - attempt.started
-        if not more_than(elapsed, self._collision):
+        if short and not more_than(elapsed, self._collision):
             return
         self._earlier += 1
         if failed and self._remembers_failures:

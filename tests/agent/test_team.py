@@ -91,7 +91,8 @@ async def test_a_failing_behaviour_set_harms_only_its_own_attempt(caplog: pytest
         team.factories["left"] = lambda: [Broken()]
         summary = await team.run()
     drops = [m for _, m in team.messages if isinstance(m, DecisionMade) and m.cause == "body_failed"]
-    assert drops and all(drop.sender == "left" for drop in drops)
+    assert drops
+    assert all(drop.sender == "left" for drop in drops)
     assert summary["complete"]
     assert summary["tasks"]["a"]["by"] != []
     assert "gripper jammed" in caplog.text
@@ -109,9 +110,7 @@ async def test_a_behaviour_set_whose_sensing_fails_is_not_applicable(caplog: pyt
         summary = await team.run()
     assert summary["complete"]
     assert all(attempt["robot"] == "right" for attempt in summary["tasks"]["a"]["attempts"])
-    assert [record.message for record in caplog.records].count(
-        f"sensing of {team.robots['left']._repertoire['a']!r} failed; taken as not applicable"
-    ) == 1
+    assert [record.message for record in caplog.records] == ["sensing of <Blind for a> failed; taken as not applicable"]
 
 
 async def test_training_fills_every_monitor_and_the_live_mission_is_faster() -> None:

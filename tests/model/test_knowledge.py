@@ -58,16 +58,24 @@ def test_read_literally_the_robot_itself_is_not_in_the_minimum() -> None:
 
 def test_low_and_high_range_over_all_robots_and_tasks_known() -> None:
     made = knowledge({"x": times(me=5.0, a=7.0), "y": times(b=2.0)})
-    assert made.span(5.0) == (2.0, 7.0)
+    assert made.span() == (2.0, 7.0)
     assert made.scale(2.0, 7.0) == pytest.approx(0.16)  # (1.0 - 0.2) / (7 - 2)
 
 
-def test_low_and_high_are_widened_to_an_own_time_that_a_failure_has_raised() -> None:
-    assert knowledge({"x": times(me=5.0, a=7.0)}).span(50.0) == (5.0, 50.0)
+def test_low_and_high_take_in_an_own_time_that_a_failure_has_raised() -> None:
+    """Also where there is no sample: what has failed is to be wanted later than what has not been tried."""
+    assert knowledge({"x": times(me=5.0, a=7.0), "y": {"me": Record((), 50.0, 1)}}).span() == (5.0, 50.0)
+    assert knowledge({"x": {"me": Record((), 50.0, 1)}}).span() == (30.0, 50.0)
 
 
-def test_with_nothing_known_low_and_high_are_the_own_time() -> None:
-    assert knowledge().span(30.0) == (30.0, 30.0)
+def test_with_nothing_known_low_and_high_are_the_initial_time() -> None:
+    assert knowledge().span() == (30.0, 30.0)
+
+
+def test_read_literally_low_and_high_are_undefined_where_nothing_is_known() -> None:
+    literal = {Erratum.UNKNOWN_TIMES: Reading.LITERAL}
+    assert all(math.isnan(end) for end in knowledge(readings=literal).span())
+    assert knowledge({"x": times(me=5.0, a=7.0)}, readings=literal).span() == (5.0, 7.0)
 
 
 def test_a_teammate_is_known_by_a_time_and_not_by_a_failure() -> None:
@@ -78,10 +86,10 @@ def test_a_teammate_is_known_by_a_time_and_not_by_a_failure() -> None:
 
 def test_what_is_learned_later_is_seen() -> None:
     made = knowledge({"x": times(me=5.0)})
-    assert (made.span(5.0), made.knows_teammates) == ((5.0, 5.0), False)
+    assert (made.span(), made.knows_teammates) == ((5.0, 5.0), False)
     made.monitors["y"].observe("a", 9.0, 9.0)
     made.monitors["y"].completed(9.0)
-    assert (made.span(5.0), made.knows_teammates, made.time_of("a", "y")) == ((5.0, 9.0), True, 9.0)
+    assert (made.span(), made.knows_teammates, made.time_of("a", "y")) == ((5.0, 9.0), True, 9.0)
 
 
 def test_fewest_counts_each_robot_for_each_task_it_shares() -> None:

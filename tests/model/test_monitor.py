@@ -157,14 +157,30 @@ def test_an_own_collision_does_not_spoil_the_sample_of_the_other() -> None:
     assert one.records() == {"a": Record((5.0,))}
 
 
-def test_an_attempt_as_short_as_the_collision_window_is_as_if_it_had_never_been() -> None:
-    for length, counted in ((0.4, True), (0.5, False)):
-        one = monitor()
-        one.began(0.0)
-        one.ceased(length, failed=True)
-        one.began(1.0)
-        one.completed(6.0)
-        assert one.count("me") == (1 if counted else 0)
+@pytest.mark.parametrize(("length", "samples"), [(0.4, 1), (0.5, 0)])
+def test_an_attempt_as_short_as_the_collision_window_is_as_if_it_had_never_been(length: float, samples: int) -> None:
+    one = monitor()
+    one.began(0.0)
+    one.ceased(length, failed=False)
+    one.began(1.0)
+    one.completed(6.0)
+    assert one.count("me") == samples
+    two = monitor()
+    two.observe("a", length, length)
+    two.elsewhere("a", length)
+    two.settle(2.0)
+    two.began(2.5)
+    two.completed(6.0)
+    assert two.count("me") == samples
+    assert two.floor("a") == (0.0 if samples else 1.0)
+
+
+def test_an_own_short_attempt_that_failed_is_remembered() -> None:
+    """Or a robot whose psi is below the collision window would yield and come back for ever."""
+    one = monitor()
+    one.began(0.0)
+    one.ceased(0.3, failed=True)
+    assert one.records() == {"me": Record((), 0.6, 10)}
 
 
 def test_the_own_attempt_is_measured_exactly() -> None:

@@ -231,7 +231,7 @@ def test_a_mission_ends_where_every_task_has_a_robot_that_progresses(scene: Scen
 
 
 @anything(60)
-@given(scene=scenes(deaths=True, stuck=True))
+@given(scene=scenes(deaths=True, stuck=True, architectures=(Architecture.L_ALLIANCE,)))
 def test_a_mission_ends_also_where_robots_are_stuck_on_what_another_can_do(scene: Scene) -> None:
     assert scene.arena().run(1500) < 1500
 
