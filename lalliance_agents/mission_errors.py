@@ -85,6 +85,8 @@ class _Told(NamedTuple):
     """The field that is missing."""
     meant: Place = ()
     """The place that an unknown field was probably to have."""
+    key: Place = ()
+    """The place whose key, not whose value, is wrong."""
 
     @property
     def sentence(self) -> str:
@@ -118,7 +120,7 @@ def explain(
         told_all += _likeliest(alternatives) if alternatives else []
     misspelled = {told.meant for told in told_all if told.meant}
     return found + [
-        Finding(line_of(told.place, spots), told.place, told.sentence)
+        Finding(line_of(told.key or told.place, spots), told.place, told.sentence)
         for told in told_all
         if (*told.place, told.missing) not in misspelled
     ]
@@ -182,11 +184,12 @@ def _tell(error: ErrorDetails, record: type[BaseModel], spots: Mapping[Place, Sp
     if kind == "union_tag_invalid":
         place = (*place, context["discriminator"].strip("'"))
         spot = spots.get(place, Spot(0, context["tag"]))
+    key: Place = ()
     if of_key:
-        spot, place = Spot(spot.line, place[-1]), place[:-1]
+        spot, key, place = Spot(spot.line, place[-1]), place, place[:-1]
     if kind in _EXPECTED and not kind.endswith(_OF_KIND):
         depth += 1
-    return _Told(place, depth, alternative, *_judge(kind, context, spot, error["msg"]))
+    return _Told(place, depth, alternative, *_judge(kind, context, spot, error["msg"]), key=key)
 
 
 def _missing(field: str | int, place: Place, alternative: Place) -> _Told:

@@ -27,6 +27,8 @@ from mission_control.processes import GRACE, Child
 OPERATOR = "operator"
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
+#: How long the world server may take to end after the last robot did, in seconds.
+LAST_CHANCE = 5.0
 #: How often a router that dies is started again.
 ROUTER_RESTARTS = 20
 
@@ -103,7 +105,7 @@ class Launcher:
                 await self._start_router()
             async with await open_bus(self._endpoint) as bus:
                 messenger = await self._watch(bus)
-                world = await Child.start("world", self._plan.world(self._endpoint), self._on_line)
+                world = await Child.start("world", self._plan.world(self._endpoint), self._on_line, keeps_output=True)
                 first = [name for name, spec in self._plan.mission.robots.items() if spec.joins == 0]
                 await asyncio.gather(*(self._start_robot(name) for name in first))
                 summary = await self._await_end(world)
@@ -158,7 +160,8 @@ class Launcher:
         self._view.say(f"[{name}] {line}")
 
     async def _start_router(self) -> None:
-        child = await Child.start("router", ["router", "--listen", self._endpoint], lambda _name, _line: None)
+        arguments = ["router", "--listen", self._endpoint]
+        child = await Child.start("router", arguments, lambda _name, _line: None, keeps_output=True)
         self._router = child
         try:
             async with asyncio.timeout(ROUTER_TIMEOUT):
@@ -178,26 +181,41 @@ class Launcher:
             await child.wait()
             self._view.say(f"the router ended ({child.status}); starting it again")
             arguments = ["router", "--listen", self._endpoint]
-            child = self._router = await Child.start("router", arguments, self._on_line)
+            child = self._router = await Child.start("router", arguments, self._on_line, keeps_output=True)
             await child.read_line()
 
     async def _await_end(self, world: Child) -> dict[str, Any]:
+        """The summary of the world server, or an error as soon as nobody is left to complete the mission."""
         ending = asyncio.create_task(world.read_all())
+        deserted = asyncio.create_task(self._await_desertion())
         try:
-            while not ending.done():
-                robots_gone = asyncio.create_task(self._robot_ended.wait())
-                await asyncio.wait({ending, robots_gone}, return_when=asyncio.FIRST_COMPLETED)
-                robots_gone.cancel()
-                self._robot_ended.clear()
+            await asyncio.wait({ending, deserted}, return_when=asyncio.FIRST_COMPLETED)
+            if not ending.done():
+                await asyncio.wait({ending}, timeout=LAST_CHANCE)
+            if not ending.done():
+                ends = ", ".join(f"{name}: {child.status}" for name, child in self._robots.items())
+                raise LaunchError(f"no robot is left to complete the mission ({ends})")
             return await self._read_summary(world, ending.result())
         finally:
             ending.cancel()
+            deserted.cancel()
+
+    async def _await_desertion(self) -> None:
+        """Return when every robot has been there, has ended, and will not return."""
+        returning = {fault.robot for fault in self._plan.mission.faults if fault.restart}
+        while returning or self._robots.keys() != self._plan.mission.robots.keys() or self._any_robot_runs():
+            await self._robot_ended.wait()
+            self._robot_ended.clear()
+
+    def _any_robot_runs(self) -> bool:
+        return any(child.running for child in self._robots.values())
 
     async def _read_summary(self, world: Child, output: str) -> dict[str, Any]:
+        """The last line of the world's output; what its environment may have printed stands before."""
         await world.wait()
         try:
-            summary: dict[str, Any] = json.loads(output)
-        except ValueError:
+            summary: dict[str, Any] = json.loads(output.splitlines()[-1])
+        except (ValueError, IndexError):
             raise LaunchError(f"the world server ended without a summary ({world.status}): {world.last_line}") from None
         return summary
 

@@ -63,6 +63,7 @@ class LiveView(Lines):
     def __init__(self, mission: Mission, console: Console) -> None:
         super().__init__(console)
         self._mission = mission
+        self._name_width = max(map(len, [*mission.robots, *mission.tasks]))
         self._live = Live(console=console, get_renderable=self._render, refresh_per_second=5, transient=True)
 
     def __enter__(self) -> Self:
@@ -98,8 +99,11 @@ class LiveView(Lines):
 
     def _robots(self, rows: int) -> Table:
         table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False)
-        for column in ("robot", "on", "most motivated for", "motivation"):
-            table.add_column(column, no_wrap=True)
+        widest = max(map(len, self._mission.tasks))
+        table.add_column("robot", no_wrap=True, min_width=self._name_width)
+        table.add_column("on", no_wrap=True, min_width=max(widest, len("not there")))
+        table.add_column("most motivated for", no_wrap=True, min_width=widest + len(" (waiting)"))
+        table.add_column("motivation", no_wrap=True)
         status = self._picture.status
         facts = status.robots if status else {}
         for robot in list(self._mission.robots)[: rows - 2]:
@@ -127,8 +131,10 @@ class LiveView(Lines):
 
     def _tasks(self, rows: int) -> Table:
         table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False)
-        for column in ("task", "progress", "", "robots"):
-            table.add_column(column, no_wrap=True)
+        table.add_column("task", no_wrap=True, min_width=self._name_width)
+        table.add_column("progress", no_wrap=True)
+        table.add_column("", no_wrap=True, min_width=len("not yet"))
+        table.add_column("robots", no_wrap=True)
         status = self._picture.status
         facts = status.tasks if status else {}
         open_first = sorted(self._mission.tasks, key=lambda task: bool(facts.get(task, {}).get("complete")))

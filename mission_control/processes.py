@@ -16,6 +16,9 @@ from collections.abc import Callable, Sequence
 #: How long a child may take to end by itself when asked to, in seconds.
 GRACE = 1.0
 
+#: Longest line read from a child, in bytes.
+LONGEST_LINE = 2**24
+
 _PR_SET_PDEATHSIG = 1
 
 OnLine = Callable[[str, str], None]
@@ -35,18 +38,22 @@ class Child:
     Args:
         name: what it is called in messages.
         process: the process.
-        on_line: called with the name and each line that the child writes to standard error.
+        on_line: called with the name and each line that the child writes.
+        keeps_output: whether its standard output is for `read_line` and `read_all` instead.
     """
 
-    def __init__(self, name: str, process: asyncio.subprocess.Process, on_line: OnLine) -> None:
+    def __init__(self, name: str, process: asyncio.subprocess.Process, on_line: OnLine, *, keeps_output: bool) -> None:
         self.name = name
         self._process = process
         self._on_line = on_line
-        self._errors = asyncio.create_task(self._read_errors(), name=f"errors of {name}")
+        streams = [process.stderr] if keeps_output else [process.stderr, process.stdout]
+        self._readers = [asyncio.create_task(self._read(stream)) for stream in streams if stream is not None]
         self.last_line = ""
 
     @classmethod
-    async def start(cls, name: str, arguments: Sequence[str], on_line: OnLine) -> "Child":
+    async def start(
+        cls, name: str, arguments: Sequence[str], on_line: OnLine, *, keeps_output: bool = False
+    ) -> "Child":
         """Start `lalliance` with `arguments`; the parent's id is handed down."""
         process = await asyncio.create_subprocess_exec(
             sys.executable,
@@ -59,9 +66,10 @@ class Child:
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
             start_new_session=True,
-            limit=2**24,
+            limit=LONGEST_LINE,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )
-        return cls(name, process, on_line)
+        return cls(name, process, on_line, keeps_output=keeps_output)
 
     def __repr__(self) -> str:
         return f"<Child {self.name}: process {self._process.pid}, {self.status}>"
@@ -102,7 +110,7 @@ class Child:
     async def wait(self) -> int:
         """Wait for its end; its exit status."""
         code = await self._process.wait()
-        await self._errors
+        await asyncio.wait(self._readers)
         return code
 
     def send_signal(self, number: signal.Signals) -> None:
@@ -120,10 +128,15 @@ class Child:
         except TimeoutError:
             self.send_signal(signal.SIGKILL)
             await self._process.wait()
-        await self._errors
+        await asyncio.wait(self._readers, timeout=GRACE)
 
-    async def _read_errors(self) -> None:
-        stream = self._process.stderr
-        while stream is not None and (line := await stream.readline()):
+    async def _read(self, stream: asyncio.StreamReader) -> None:
+        while True:
+            try:
+                line = await stream.readline()
+            except ValueError:  # longer than the limit; what is left of it is read next
+                continue
+            if not line:
+                return
             self.last_line = line.decode(errors="replace").rstrip()
             self._on_line(self.name, self.last_line)

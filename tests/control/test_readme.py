@@ -1,0 +1,75 @@
+"""What the README shows, done as it says."""
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support.processes import MISSIONS, Processes, read_until
+
+from lalliance_agents.bus.router import free_endpoint
+
+README = (MISSIONS.parent / "README.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.DOTALL | re.MULTILINE)
+
+
+def commands(block: str) -> list[list[str]]:
+    return [shlex.split(line)[1:] for line in block.splitlines() if line.startswith("lalliance ")]
+
+
+@pytest.fixture
+def processes(tmp_path: Path) -> Iterator[Processes]:
+    (tmp_path / "missions").symlink_to(MISSIONS)
+    [mission] = blocks("yaml")
+    (tmp_path / "two-rooms.yaml").write_text(mission)
+    [code] = blocks("python")
+    (tmp_path / "my_robot.py").write_text(code)
+    with Processes(tmp_path) as tree:
+        yield tree
+
+
+TOGETHER = [block for block in blocks("console") if "lalliance router" in block]
+ALONE = [command for block in blocks("console") if block not in TOGETHER for command in commands(block)]
+
+
+@pytest.mark.parametrize("command", ALONE, ids=" ".join)
+def test_each_command_works(processes: Processes, command: list[str]) -> None:
+    done = processes.run(*command)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+    assert processes.alive() == []
+
+
+def test_a_robot_of_ones_own_performs_and_takes_the_task_over(processes: Processes) -> None:
+    done = processes.run("run", "two-rooms.yaml", "--speed", "2")
+    assert done.returncode == 0, done.stderr
+    assert "all-rounder takes sweep from broom (silence)" in done.stdout
+    assert "mopping, progress 0.0" in done.stdout
+    assert "mop put away" in done.stdout
+
+
+def test_the_single_processes_make_a_team(processes: Processes) -> None:
+    endpoint = free_endpoint()
+    [block] = TOGETHER
+    router, world, *robots = [
+        [word.replace("tcp/127.0.0.1:7447", endpoint) for word in command] for command in commands(block)
+    ]
+    running = processes.start(*router)
+    read_until(running, "listens")
+    team = [processes.start(*command) for command in robots]
+    done = processes.run(*world)
+    assert done.returncode == 0, done.stderr
+    assert "Mission two-rooms complete" in done.stdout
+    for member in team:
+        member.communicate(timeout=10)
+        assert member.returncode == 0
+
+
+def test_every_command_of_the_tool_is_in_the_readme(processes: Processes) -> None:
+    listed = re.findall(r"^  (\w+)  ", processes.run("--help").stdout, flags=re.MULTILINE)
+    assert len(listed) == 6
+    assert [name for name in listed if f"lalliance {name}" not in README] == []
