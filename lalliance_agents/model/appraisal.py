@@ -56,9 +56,10 @@ class Appraisal:
         now, own_time = moment.now, self._knowledge.own_time(one.task)
         best_time = self._knowledge.best_time(one.task, moment.present)
         contended = self._hearing.anybody_on(one.task, now)
-        category = equations.task_category(
-            own_time, best_time, contended, self._knowledge.knows_teammates, self._parameters.ordering
-        )
+        # A robot does not expect to be best by a time that is only a lower bound: or it returns to its failure before
+        # it is bored enough to try what a stuck teammate holds, and the two never come free.
+        expects = self._knowledge.knows_teammates and not self._knowledge.has_failed(one.task)
+        category = equations.task_category(own_time, best_time, contended, expects, self._parameters.ordering)
         fast = self._fast_rate(one, category, own_time)
         pace, rate = self._impatience(one, moment, own_time, fast)
         psi, lambda_ = self._patience_with_oneself(one.task, own_time, best_time)

@@ -1,7 +1,7 @@
 """What a robot takes the times of its team to be: the monitors of all its behaviour sets, read together.
 
-Here stands what replaces an unknown time (erratum 10): the robot's own unknown time is the largest it knows of, or
-`initial_task_time` where it knows nothing; a teammate's unknown time is left out. `low` and `high` range over every robot
+Here stands what replaces an unknown time (erratum 10): the robot's own unknown time is the largest it has measured, or
+`initial_task_time` where it has measured none; a teammate's unknown time is left out. `low` and `high` range over every robot
 and task known, for tasks this robot can do, and over the robot's own times as replaced: or a robot that knows nothing but
 that it failed at one task would want it as much as another.
 """
@@ -40,7 +40,8 @@ class Knowledge:
             return
         self._seen = seen
         known = [(robot, time) for monitor in self.monitors.values() for robot, time in monitor.times()]
-        self._fallback = max((time for _, time in known), default=self._parameters.initial_task_time)
+        measured = [time for monitor in self.monitors.values() for time in monitor.measured()]
+        self._fallback = max(measured, default=self._parameters.initial_task_time)
         times = [time for _, time in known] + [self.own_time(task) for task in self.monitors]
         self._low = min((time for time in times if not math.isnan(time)), default=math.nan)
         self._high = max((time for time in times if not math.isnan(time)), default=math.nan)
@@ -56,6 +57,11 @@ class Knowledge:
             return math.nan
         self._read()
         return max(self._fallback, monitor.floor(self._me))
+
+    def has_failed(self, task: str) -> bool:
+        """Whether the own time is but the lower bound that a failed attempt has left (erratum 13)."""
+        floor = self.monitors[task].floor(self._me)
+        return floor > 0.0 and self.own_time(task) <= floor
 
     def best_time(self, task: str, present: Sequence[str]) -> float:
         """The least task time of the robots present, this one included (erratum 3), in seconds; else infinity."""

@@ -242,6 +242,7 @@ class Mind:
         if cause is not Cause.SENSED:
             self.knowledge.monitors[one.task].ceased(now, failed=cause not in _BLAMELESS)
         one.deactivate(now)
+        one.factors = decision.factors._replace(motivation=0.0)
         if not self._bored_at_work:
             self._idle_since = now
         return decision

@@ -193,6 +193,10 @@ class Monitor:
         """Each robot whose time is known, with that time in seconds."""
         return [(robot, known.time) for robot, known in self._performances.items() if known.time is not None]
 
+    def measured(self) -> Iterable[float]:
+        """The time of each robot by its samples alone, whatever has failed since, in seconds."""
+        return [task_time(known.samples) for known in self._performances.values() if known.samples]
+
     def count(self, robot: str) -> int:
         """The number of samples kept of `robot`, at most mu."""
         known = self._performances.get(robot)

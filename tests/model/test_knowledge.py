@@ -28,6 +28,11 @@ def test_the_own_unknown_time_is_the_largest_known_for_any_robot_and_task() -> N
     assert knowledge({"x": times(me=5.0, a=7.0)}).own_time("y") == 7.0
 
 
+def test_a_failure_at_one_task_says_nothing_of_another() -> None:
+    made = knowledge({"x": {"me": Record((5.0,), 40.0, 1), "a": Record((7.0,), 80.0, 1)}})
+    assert (made.own_time("x"), made.own_time("y")) == (40.0, 7.0)
+
+
 def test_with_nothing_known_the_own_time_is_the_initial_one() -> None:
     assert knowledge(initial_task_time=42.0).own_time("x") == 42.0
 
@@ -35,6 +40,13 @@ def test_with_nothing_known_the_own_time_is_the_initial_one() -> None:
 def test_a_failed_attempt_raises_the_own_unknown_time() -> None:
     assert knowledge({"x": {"me": Record((), 50.0, 1)}}).own_time("x") == 50.0
     assert knowledge({"x": {"me": Record((), 50.0, 1)}}).own_time("y") == 30.0
+
+
+def test_an_own_time_that_is_but_a_lower_bound_is_a_failure() -> None:
+    failed = {"x": {"me": Record((5.0,), 8.0, 1)}, "y": {"me": Record((5.0,), 2.0, 1)}}
+    assert (knowledge(failed).has_failed("x"), knowledge(failed).has_failed("y")) == (True, False)
+    assert not knowledge().has_failed("x")
+    assert knowledge({"x": {"me": Record((), 50.0, 1)}}).has_failed("x")
 
 
 def test_read_literally_an_unknown_time_is_undefined() -> None:

@@ -205,6 +205,17 @@ def test_without_contender_a_stuck_robot_gives_up_after_more_than_lambda_and_tri
     ]
 
 
+def test_a_robot_that_failed_tries_what_a_stuck_teammate_holds_before_it_returns_to_its_failure() -> None:
+    """Nobody else's time for x is known; a is not the best at it by the lower bound that its failure has left."""
+    arena = Arena(
+        {"a": {"x": 3.0, "y": 3.0}, "b": {"x": 3.0, "y": 3.0}},
+        known={"x": {"a": 3}, "y": {"b": 3}},
+        stuck=frozenset({("a", "x"), ("b", "y")}),
+    )
+    assert arena.run(60) < 60
+    assert {task: robot for task, (_, robot) in arena.completed.items()} == {"x": "b", "y": "a"}
+
+
 def test_of_robots_that_start_together_the_fastest_goes_on() -> None:
     """Nothing is known of teammates; the own times differ, but both delays are 0.2 s."""
     arena = Arena({"a": {"x": 9.0}, "b": {"x": 5.0}})
