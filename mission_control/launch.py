@@ -24,7 +24,7 @@ from lalliance_agents.wire.messages import Event, Message
 from mission_control.live import Lines
 from mission_control.processes import GRACE, Child
 
-OPERATOR = "operator"
+OPERATOR = "@operator"
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
 #: How long the world server may take to end after the last robot did, in seconds.

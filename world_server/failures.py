@@ -46,7 +46,12 @@ class Failures:
 
     def __init__(self, mission: Mission) -> None:
         self._crashes = [_Crash(fault) for fault in mission.faults]
-        self._joining = {name: spec.joins for name, spec in mission.robots.items() if spec.joins > 0}
+        joining = [(name, spec.joins) for name, spec in mission.robots.items() if spec.joins > 0]
+        self._joining = {
+            name: Order(number, Deed.START, name, f"joins at {joins:g} s")
+            for number, (name, joins) in enumerate(joining, 2 * len(self._crashes))
+        }
+        self._joins = dict(joining)
 
     def orders(self, elapsed: float) -> list[Order]:
         """All orders that are due and not confirmed, `elapsed` seconds after the live trial's start."""
@@ -58,11 +63,7 @@ class Failures:
             back = crash.fault.restart_at
             if back is not None and back <= elapsed and crash.fired_at is not None and not crash.returned:
                 due.append(Order(2 * number + 1, Deed.START, crash.fault.robot, f"restart at {back:g} s"))
-        first = 2 * len(self._crashes)
-        for number, (robot, joins) in enumerate(self._joining.items()):
-            if joins <= elapsed:
-                due.append(Order(first + number, Deed.START, robot, f"joins at {joins:g} s"))
-        return due
+        return due + [order for robot, order in self._joining.items() if self._joins[robot] <= elapsed]
 
     def presence(self, robot: str, present: bool, elapsed: float) -> bool:
         """`robot` came or went; whether that confirms an order."""

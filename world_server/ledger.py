@@ -2,10 +2,14 @@
 
 The ledger writes down who worked on what and when, what was completed, which task went from one robot to another and why, and
 what everybody sent and received. Instants are the world's, in seconds since the live trial began; where a robot's own account
-is used, only a length of time measured on that robot's clock enters.
+is used, only a length of time measured on that robot's clock enters, and what is not a number there is left out. However
+often a robot says something, what is kept of it is limited: the latest attempts and takeovers, and sums of counters.
 """
 
-from collections import Counter
+import math
+from collections import Counter, deque
+from collections.abc import Iterable
+from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,10 +17,36 @@ from lalliance_agents.wire.messages import DecisionMade, LinkReport
 
 _TAKEOVERS = {"silence", "impatience", "released"}
 
+#: Attempts kept per task, and takeovers kept in all: the latest.
+MOST_KEPT = 1000
+#: Reasons of drops that are told apart; those of a robot that makes up more count as `OTHER_REASONS`.
+MOST_REASONS = 100
+OTHER_REASONS = "others"
+
+
+@dataclass(slots=True)
+class _Counts:
+    """Sums over link reports."""
+
+    sent: int = 0
+    received: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+    ticks: int = 0
+    missed: int = 0
+
+    def add(self, report: LinkReport) -> None:
+        self.sent += report.sent
+        self.received += report.received
+        self.ticks += report.ticks
+        self.missed += report.missed
+        for reason, count in report.dropped.items():
+            known = reason in self.dropped or len(self.dropped) < MOST_REASONS
+            self.dropped[reason if known else OTHER_REASONS] += count
+
 
 @dataclass(slots=True)
 class _TaskRecord:
-    attempts: list[tuple[str, float]] = field(default_factory=list)
+    attempts: deque[tuple[str, float]] = field(default_factory=lambda: deque(maxlen=MOST_KEPT))
     completed_at: float | None = None
     by: tuple[str, ...] = ()
 
@@ -31,8 +61,9 @@ class Ledger:
     def __init__(self, tasks: list[str]) -> None:
         self._tasks = {task: _TaskRecord() for task in tasks}
         self._failed_at: dict[str, float] = {}
-        self._takeovers: list[dict[str, Any]] = []
-        self._links: dict[tuple[str, int], LinkReport] = {}
+        self._takeovers: deque[dict[str, Any]] = deque(maxlen=MOST_KEPT)
+        self._links: dict[str, LinkReport] = {}
+        self._earlier_lives = _Counts()
         self.trials: list[float] = []
 
     def new_trial(self) -> None:
@@ -77,7 +108,7 @@ class Ledger:
             "cause": made.cause,
             "detected_at": _detected_at(made, at),
             "taken_at": at,
-            "delay": made.factors.get("delay"),
+            "delay": _number(made.factors.get("delay")),
         }
         if made.other in self._failed_at:
             takeover["failed_at"] = self._failed_at[made.other]
@@ -87,18 +118,25 @@ class Ledger:
 
     def reported(self, report: LinkReport) -> None:
         """A robot's counters, which replace the ones it reported before in this incarnation."""
-        self._links[report.sender, report.incarnation] = report
+        before = self._links.get(report.sender)
+        if before is not None and before.incarnation != report.incarnation:
+            self._earlier_lives.add(before)
+        self._links[report.sender] = report
 
     def has_final(self, robot: str) -> bool:
         """Whether the latest life of `robot` has reported its counters for the last time."""
-        lives = [incarnation for name, incarnation in self._links if name == robot]
-        return bool(lives) and self._links[robot, max(lives)].final
+        return robot in self._links and self._links[robot].final
+
+    @property
+    def last_completion(self) -> float | None:
+        """When the last task was completed, if any was."""
+        return max((one.completed_at for one in self._tasks.values() if one.completed_at is not None), default=None)
 
     def summary(self) -> dict[str, Any]:
         """Tasks, takeovers, messages and control periods, as plain data."""
-        dropped: Counter[str] = Counter()
+        counts = deepcopy(self._earlier_lives)
         for report in self._links.values():
-            dropped.update(report.dropped)
+            counts.add(report)
         return {
             "tasks": {
                 task: {
@@ -110,18 +148,15 @@ class Ledger:
             },
             "takeovers": [dict(takeover) for takeover in self._takeovers],
             "messages": {
-                "sent": sum(report.sent for report in self._links.values()),
-                "received": sum(report.received for report in self._links.values()),
-                "dropped": dict(sorted(dropped.items())),
+                "sent": counts.sent,
+                "received": counts.received,
+                "dropped": dict(sorted(counts.dropped.items())),
             },
-            "control": {
-                "periods": sum(report.ticks for report in self._links.values()),
-                "missed": sum(report.missed for report in self._links.values()),
-            },
+            "control": {"periods": counts.ticks, "missed": counts.missed},
         }
 
 
-def _had_it_last(attempts: list[tuple[str, float]], other: str, sender: str) -> bool:
+def _had_it_last(attempts: Iterable[tuple[str, float]], other: str, sender: str) -> bool:
     """Whether `other` began the task after all but the present attempt of `sender`, which is its latest."""
     order = [robot for robot, _ in attempts]
     if other not in order:
@@ -134,7 +169,11 @@ def _had_it_last(attempts: list[tuple[str, float]], other: str, sender: str) -> 
 def _detected_at(made: DecisionMade, at: float) -> float | None:
     """When the robot noticed that the other was gone from the task; None if it is still heard there."""
     for mate in made.teammates:
-        lapsed = mate.get("lapsed_at")
-        if mate.get("robot") == made.other and isinstance(lapsed, int | float):
-            return at - max(made.at - lapsed, 0.0)
+        lapsed = _number(mate.get("lapsed_at"))
+        if mate.get("robot") == made.other and lapsed is not None:
+            return max(at - max(made.at - lapsed, 0.0), 0.0)
     return None
+
+
+def _number(value: str | float | None) -> float | None:
+    return value if isinstance(value, int | float) and math.isfinite(value) else None

@@ -11,10 +11,11 @@ from typing import Any
 
 from lalliance_agents.bus.base import Bus, Registration, Sample
 from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.bus.patterns import matches
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import MessageError
-from lalliance_agents.wire.keys import Key, Keys, Kind
+from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Action, DecisionMade, LinkReport, Message
 from world_server.environments.base import TaskView
 from world_server.failures import Order
@@ -22,7 +23,6 @@ from world_server.world import Happening, World
 
 _log = logging.getLogger(__name__)
 
-WORLD = "world"
 #: Time between two steps, in mission seconds, and at least in real ones.
 STEP = 0.05
 LEAST_STEP = 0.01
@@ -68,8 +68,7 @@ class WorldServer:
             give_up_waiting = self._clock.now() + self._patience * self._speed
             while not self._world.over:
                 now = self._clock.now()
-                missing = self._world.missing()
-                if not missing or (now >= give_up_waiting and len(missing) < len(self._world.bodies)):
+                if not self._world.missing() or (now >= give_up_waiting and self._world.some_there()):
                     self._world.begin(now)
                 self._world.advance(now)
                 self._publish(now)
@@ -105,21 +104,22 @@ class WorldServer:
         try:
             parsed = self._keys.parse(key)
         except MessageError as error:
-            self._messenger.drop(error.reason, key, str(error))
+            self._messenger.drop(error.reason, "an unknown key", str(error))
             return
         if parsed.kind is Kind.ALIVE and parsed.robot is not None:
             self._world.presence(parsed.robot, present, self._clock.now())
 
     def _receive(self, _: Key, message: Message) -> None:
+        if message.sender not in self._world.bodies:
+            self._messenger.drop("stranger", message.sender)
+            return
         match message:
             case Action():
                 self._world.act(message, self._clock.now())
             case DecisionMade():
                 self._world.decided(message, self._clock.now())
-            case LinkReport() if message.sender in self._world.bodies:
+            case LinkReport():
                 self._world.ledger.reported(message)
-            case _:
-                self._messenger.drop("stranger", message.sender)
 
     def _tell(self, happening: Happening) -> None:
         _log.info("%.1f s %s", happening.elapsed, happening.text)
@@ -179,7 +179,7 @@ class WorldServer:
             learning=world.learning,
             elapsed=max(world.elapsed, 0.0),
             tasks={
-                task: {"complete": view.complete, "applicable": view.applicable, "progress": view.progress}
+                task: {"complete": view.complete, "applicable": view.applicable, "progress": _share(view.progress)}
                 for task, view in tasks.items()
             },
             robots={robot: {"present": body.present, "task": body.task} for robot, body in world.bodies.items()},
@@ -191,28 +191,30 @@ class WorldServer:
             "learning": self._world.learning,
             "applicable": view.applicable,
             "complete": view.complete,
-            "progress": min(max(view.progress, 0.0), 1.0),
+            "progress": _share(view.progress),
         }
 
     def _body_fields(self) -> dict[str, Any]:
         return {"mission": self._world.stage.value, "trial": self._world.trial, "learning": self._world.learning}
 
-    def _answer_tasks(self, _: str) -> list[Sample]:
+    def _answer_tasks(self, query: str) -> list[Sample]:
         self._world.advance(self._clock.now())
+        keys = {self._keys.build(Kind.SENSE_TASK, task=task): view for task, view in self._world.tasks().items()}
         return [
-            Sample(
-                self._keys.build(Kind.SENSE_TASK, task=task),
-                self._messenger.compose(Kind.SENSE_TASK, **self._task_fields(view)),
-            )
-            for task, view in self._world.tasks().items()
+            Sample(key, self._messenger.compose(Kind.SENSE_TASK, **self._task_fields(view)))
+            for key, view in keys.items()
+            if matches(query, key)
         ]
 
     def _answer_bodies(self, query: str) -> list[Sample]:
-        robots = [robot for robot in self._world.bodies if query == self._keys.build(Kind.SENSE_ROBOT, robot=robot)]
+        keys = [self._keys.build(Kind.SENSE_ROBOT, robot=robot) for robot in self._world.bodies]
         return [
-            Sample(
-                self._keys.build(Kind.SENSE_ROBOT, robot=robot),
-                self._messenger.compose(Kind.SENSE_ROBOT, **self._body_fields()),
-            )
-            for robot in robots
+            Sample(key, self._messenger.compose(Kind.SENSE_ROBOT, **self._body_fields()))
+            for key in keys
+            if matches(query, key)
         ]
+
+
+def _share(progress: float) -> float:
+    """A share as the wire takes it, whatever an environment of a user's own makes of it."""
+    return min(max(0.0, progress), 1.0)  # in this order also for NaN

@@ -112,6 +112,10 @@ class World:
             robot for robot, body in self.bodies.items() if not body.present and self.mission.robots[robot].joins == 0
         ]
 
+    def some_there(self) -> bool:
+        """Whether there is any robot to begin with."""
+        return any(body.present for body in self.bodies.values())
+
     def _fresh_environment(self) -> Environment:
         seed = np.random.SeedSequence([self.mission.seed, self.trial]).generate_state(1, np.uint64)[0]
         return environments.create(self.mission, seed=int(seed))
@@ -135,8 +139,10 @@ class World:
         self._pause_until = None
         self._environment = self._fresh_environment()
         self.ledger.new_trial()
-        for body in self.bodies.values():
+        for robot, body in self.bodies.items():
             body.task = None
+            if self.live and body.present:
+                self.failures.presence(robot, True, 0.0)
         self._report("trial", f"trial {self.trial} begins ({self.learning} learning)")
 
     def presence(self, robot: str, present: bool, now: float) -> None:
@@ -160,17 +166,20 @@ class World:
             self._rest()
 
     def act(self, action: Action, now: float) -> None:
-        """A robot's body is to work on a task, or on none."""
+        """A robot's body is to work on a task, or on none: also if this mission has no such task."""
         self.advance(now)
         body = self.bodies.get(action.sender)
         if body is None:
             return
         body.fewest = action.fewest
-        body.refreshed = now
-        if action.trial == self.trial and action.task != body.task:
-            body.task = action.task
-            if action.task is not None:
-                self.ledger.began(action.sender, action.task, self.elapsed)
+        if action.trial != self.trial:
+            return
+        body.refreshed = self._now
+        task = action.task if action.task in self.mission.tasks else None
+        if task != body.task:
+            body.task = task
+            if task is not None:
+                self.ledger.began(action.sender, task, self.elapsed)
             self._rest()
 
     def decided(self, made: DecisionMade, now: float) -> None:
@@ -193,6 +202,7 @@ class World:
             until = min(now, self._next_instant())
             if self._pause_until is None:
                 self._work(until)
+                self._stop_dead()
             else:
                 self._now = until
                 if until >= self._pause_until:
@@ -204,15 +214,20 @@ class World:
         if self._pause_until is not None:
             return self._pause_until
         ends = [body.refreshed + DEAD_MAN for body in self.bodies.values() if body.task is not None]
-        ends.append(self._began + self.mission.deadline)
-        return min((end for end in ends if end > self._now), default=math.inf)
+        return min([self._began + self.mission.deadline, *ends])
 
     def _actions(self) -> dict[str, Work]:
-        return {
-            robot: Work(body.task)
-            for robot, body in self.bodies.items()
-            if body.task is not None and body.present and self._now < body.refreshed + DEAD_MAN
-        }
+        return {robot: Work(body.task) for robot, body in self.bodies.items() if body.task is not None and body.present}
+
+    def _stop_dead(self) -> None:
+        """The dead-man switch: bodies whose action was not refreshed for too long stop, until their robot acts again."""
+        dead = [
+            body for body in self.bodies.values() if body.task is not None and self._now >= body.refreshed + DEAD_MAN
+        ]
+        for body in dead:
+            body.task = None
+        if dead:
+            self._rest()
 
     def _rest(self) -> None:
         """Let the environment know at once who works on what, so that no change is lost between two steps."""
@@ -220,7 +235,7 @@ class World:
             self._work(self._now)
 
     def _work(self, until: float) -> None:
-        actions = self._actions()
+        actions, since = self._actions(), self._now
         for done in self._environment.step(until - self._now, actions):
             at = self._now + done.after - self._began
             self.ledger.completed(done.task, done.by, at)
@@ -228,13 +243,16 @@ class World:
             self._tell(Happening("complete", text, at, done.by[0] if done.by else None, done.task))
         self._now = until
         if all(view.complete for view in self.tasks().values()):
+            # The trial ends with its last task, however far this step went beyond it.
+            self._now = min(max(since, self._began + (self.ledger.last_completion or 0.0)), until)
             self._end_trial()
-        elif self.elapsed >= self.mission.deadline - 1e-9:
+        elif self._now >= self._began + self.mission.deadline:
             self._end(Stage.FAILED, f"not complete by the deadline of {self.mission.deadline:g} s")
 
     def _end_trial(self) -> None:
-        done = [task["completed_at"] for task in self.ledger.summary()["tasks"].values()]
-        self.makespan = max(done)
+        last = self.ledger.last_completion
+        # An environment may have nothing to do from the start.
+        self.makespan = self.elapsed if last is None else last
         self.ledger.trials.append(self.makespan)
         while self._phases and self._phase.until == "full" and self.full and self._phases[0] is self._phase:
             self._phases.pop(0)

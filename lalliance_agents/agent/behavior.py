@@ -71,6 +71,14 @@ class AutonomousBehaviorSet(BehaviorSet):
         return self.returned
 
 
+def described(one: object) -> str:
+    """`repr(one)`, or the name of its class where a user's `__repr__` fails."""
+    try:
+        return repr(one)
+    except Exception:
+        return f"<{type(one).__name__}>"
+
+
 Factory = Callable[[], Iterable[BehaviorSet]]
 
 
@@ -101,7 +109,7 @@ def load_behaviors(place: str) -> list[BehaviorSet]:
         raise BehaviorError(f"behaviors {place!r} failed: {type(error).__name__}: {error}") from error
     for one in sets:
         if not isinstance(one, BehaviorSet):
-            raise BehaviorError(f"behaviors {place!r} returned {one!r}, expected instances of BehaviorSet")
+            raise BehaviorError(f"behaviors {place!r} returned {described(one)}, expected instances of BehaviorSet")
     return sets
 
 
@@ -109,18 +117,22 @@ def complete_repertoire(robot: str, tasks: Sequence[str], own: Iterable[Behavior
     """One behaviour set per task of `robot`: its own where there is one, else the default.
 
     Raises:
-        BehaviorError: two sets for one task, a set for a task the robot does not have in the mission, or none at all.
+        BehaviorError: two sets for one task, a set for a task the robot does not have in the mission, or something else
+            than a set.
     """
     repertoire: dict[str, BehaviorSet] = {}
     for one in own:
+        if not isinstance(one, BehaviorSet):
+            raise BehaviorError(f"robot {robot} was given {described(one)}, expected instances of BehaviorSet")
         task: str = getattr(one, "task", "")
         if task not in tasks:
             raise BehaviorError(
-                f"{one!r} is for task {task!r}, which robot {robot} does not have; expected one of {', '.join(tasks)}"
+                f"{described(one)} is for task {task!r}, which robot {robot} does not have; "
+                f"expected one of {', '.join(tasks)}"
             )
         if task in repertoire:
             raise BehaviorError(f"robot {robot} has two behaviour sets for task {task!r}, expected one")
         if not hasattr(one, "returned"):
-            raise BehaviorError(f"{one!r} did not call super().__init__()")
+            raise BehaviorError(f"{described(one)} did not call super().__init__()")
         repertoire[task] = one
     return {task: repertoire.get(task) or BehaviorSet(task) for task in tasks}

@@ -1,7 +1,8 @@
 """Learned times on disk: one JSON file per robot, written whole or not at all.
 
 A file that cannot be used is set aside under another name with a warning, and the robot begins without knowledge: what it
-learned before is worth something, but never worth not starting for. The file also counts the robot's incarnations.
+learned before is worth something, but never worth not starting for. The file also counts the robot's incarnations, and keeps
+what was learned of tasks that the present mission does not have.
 """
 
 import json
@@ -11,11 +12,13 @@ import tempfile
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lalliance_agents.errors import UserError
 from lalliance_agents.model.monitor import Record
+from lalliance_agents.wire.messages import LONGEST
 
 _log = logging.getLogger(__name__)
 
@@ -23,12 +26,16 @@ Learned = Mapping[str, Mapping[str, Record]]
 """task -> robot -> what was learned of that robot's times for that task."""
 
 
+#: The largest incarnation that a file may hold: what follows it must still fit into a message.
+LARGEST_INCARNATION = 2**62
+
+
 class _StoredRecord(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-    samples: list[float] = Field(max_length=10_000)
-    floor: float = Field(default=0.0, ge=0)
-    floor_left: int = Field(default=0, ge=0)
+    samples: list[Annotated[float, Field(gt=0, le=LONGEST)]] = Field(max_length=10_000)
+    floor: float = Field(default=0.0, ge=0, le=LONGEST)
+    floor_left: int = Field(default=0, ge=0, lt=2**63)
 
 
 class _Stored(BaseModel):
@@ -36,7 +43,7 @@ class _Stored(BaseModel):
 
     version: int = Field(ge=1, le=1)
     robot: str
-    incarnation: int = Field(ge=0, lt=2**63)
+    incarnation: int = Field(ge=0, le=LARGEST_INCARNATION)
     learned: dict[str, dict[str, _StoredRecord]]
 
 
@@ -58,26 +65,31 @@ class Catalog:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UserError(
-                f"{folder}: learned times cannot be stored here ({error.strerror}); expected a folder"
+                f"{folder}: learned times cannot be stored here ({_why(error)}); expected a folder"
             ) from error
-        stored = self._read()
-        self.learned: Learned = {} if stored is None else _records(stored)
-        #: Larger than that of every earlier life, also where the file was lost.
-        self.incarnation = max(0 if stored is None else stored.incarnation + 1, fresh_incarnation())
+        text = self._read()
         try:
+            stored = None if text is None else self._check(text)
+            self.learned: Learned = {} if stored is None else _records(stored)
+            #: Larger than that of every earlier life, also where the file was lost.
+            self.incarnation = max(0 if stored is None else stored.incarnation + 1, fresh_incarnation())
+            self._clear_away()
             self.save(self.learned)
         except OSError as error:
             raise UserError(
-                f"{self.path}: cannot be written ({error.strerror}); learned times need a writable folder"
+                f"{self.path}: cannot be written ({_why(error)}); learned times need a writable folder"
             ) from error
 
-    def _read(self) -> _Stored | None:
+    def _read(self) -> bytes | None:
         try:
-            text = self.path.read_bytes()
+            return self.path.read_bytes()
         except FileNotFoundError:
             return None
         except OSError as error:
-            raise UserError(f"{self.path}: cannot be read ({error.strerror})") from error
+            raise UserError(f"{self.path}: cannot be read ({_why(error)}); expected a file of learned times") from error
+
+    def _check(self, text: bytes) -> _Stored | None:
+        """What the file says; None if it cannot be used, and then it is out of the way."""
         try:
             stored = _Stored.model_validate_json(text)
         except ValidationError as error:
@@ -86,10 +98,12 @@ class Catalog:
         if stored.robot != self._robot:
             self._set_aside(f"it belongs to robot {stored.robot!r}")
             return None
-        if any(sample <= 0 for of in stored.learned.values() for one in of.values() for sample in one.samples):
-            self._set_aside("a learned time is not above 0")
-            return None
         return stored
+
+    def _clear_away(self) -> None:
+        """Remove what lives of this robot that were killed while writing have left."""
+        for unfinished in self.path.parent.glob(f".{self.path.name}.*"):
+            unfinished.unlink(missing_ok=True)
 
     def _set_aside(self, why: str) -> None:
         aside = self.path.with_name(f"{self.path.name}.damaged-{time.time_ns()}")
@@ -98,6 +112,8 @@ class Catalog:
 
     def save(self, learned: Learned) -> None:
         """Write `learned`; a reader, or a crash at any instant, finds the old file or the new one.
+
+        Tasks that are not in `learned` stay as they were when the file was read.
 
         Raises:
             OSError: the file cannot be written.
@@ -108,7 +124,7 @@ class Catalog:
             "incarnation": self.incarnation,
             "learned": {
                 task: {robot: record._asdict() for robot, record in records.items()}
-                for task, records in learned.items()
+                for task, records in {**self.learned, **learned}.items()
             },
         }
         handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=f".{self.path.name}.")
@@ -128,6 +144,10 @@ def _records(stored: _Stored) -> Learned:
         task: {robot: Record(tuple(one.samples), one.floor, one.floor_left) for robot, one in records.items()}
         for task, records in stored.learned.items()
     }
+
+
+def _why(error: OSError) -> str:
+    return error.strerror or str(error)
 
 
 def fresh_incarnation() -> int:

@@ -1,14 +1,15 @@
 """The body: runs the behaviour set that the mind activated, one at a time.
 
 A set that is stopped is cancelled, and the next one begins only when it has cleaned up after itself; one that does not come
-to an end within a limit is left behind with a warning, so that a stuck set cannot hold the robot for ever.
+to an end within a limit is left behind with a warning, so that a stuck set cannot hold the robot for ever. What a set does
+after it was stopped, return or fail, says nothing about its task any more.
 """
 
 import asyncio
 import logging
 from collections.abc import Callable
 
-from lalliance_agents.agent.behavior import BehaviorSet
+from lalliance_agents.agent.behavior import BehaviorSet, described
 
 _log = logging.getLogger(__name__)
 
@@ -20,8 +21,8 @@ class Performer:
     """Runs behaviour sets.
 
     Args:
-        on_failure: called with the set when its `perform` raised.
-        on_return: called with the set when its `perform` returned.
+        on_failure: called with the set when its `perform` raised, unless it was stopped before.
+        on_return: called with the set when its `perform` returned, unless it was stopped before.
     """
 
     def __init__(self, on_failure: Callable[[BehaviorSet], None], on_return: Callable[[BehaviorSet], None]) -> None:
@@ -29,6 +30,8 @@ class Performer:
         self._on_return = on_return
         self._running: dict[str, asyncio.Task[None]] = {}
         self._ending: set[asyncio.Task[None]] = set()
+        # Not waited for any more, but kept: the event loop does not hold on to tasks.
+        self._left_behind: set[asyncio.Task[None]] = set()
 
     @property
     def task(self) -> str | None:
@@ -47,24 +50,48 @@ class Performer:
             running.cancel()
             self._ending.add(running)
             running.add_done_callback(self._ending.discard)
+            running.add_done_callback(self._left_behind.discard)
+
+    def stop_all(self) -> None:
+        """Cancel every set."""
+        for task in list(self._running):
+            self.stop(task)
 
     async def _perform(self, one: BehaviorSet, before: set[asyncio.Task[None]]) -> None:
-        if before:
-            _, late = await asyncio.wait(before, timeout=CLEAN_UP_LIMIT)
-            if late:
-                _log.warning("a behaviour set did not end within %g s of being cancelled; going on", CLEAN_UP_LIMIT)
+        await self._let_end(before)
         try:
             await one.perform()
-        except Exception:
-            _log.exception("%r failed", one)
+        except (Exception, SystemExit):
+            _log.exception("%s failed", described(one))
+            if not _is_stopped():
+                self._on_failure(one)
+        except asyncio.CancelledError:
+            if _is_stopped():
+                raise
+            # Nobody stopped this set: something that it waited for was cancelled.
+            _log.exception("%s failed", described(one))
             self._on_failure(one)
         else:
-            one.returned = True
-            self._on_return(one)
+            if not _is_stopped():
+                one.returned = True
+                self._on_return(one)
+
+    async def _let_end(self, before: set[asyncio.Task[None]]) -> None:
+        if not before:
+            return
+        _, late = await asyncio.wait(before, timeout=CLEAN_UP_LIMIT)
+        for task in late - self._left_behind:
+            _log.warning("%s did not end within %g s of being stopped; going on", task.get_name(), CLEAN_UP_LIMIT)
+        self._left_behind |= late
+        self._ending -= late
 
     async def close(self) -> None:
         """Cancel what runs and wait for it to clean up, within the limit."""
-        for task in list(self._running):
-            self.stop(task)
-        if self._ending:
-            await asyncio.wait(set(self._ending), timeout=CLEAN_UP_LIMIT)
+        self.stop_all()
+        await self._let_end(set(self._ending))
+
+
+def _is_stopped() -> bool:
+    """Whether the present task was asked to end."""
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0

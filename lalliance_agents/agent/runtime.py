@@ -13,13 +13,13 @@ from collections.abc import Iterable
 from typing import Any, Literal
 
 from lalliance_agents.agent import translate
-from lalliance_agents.agent.behavior import BehaviorSet, complete_repertoire
+from lalliance_agents.agent.behavior import BehaviorSet, complete_repertoire, described
 from lalliance_agents.agent.catalog import Catalog, fresh_incarnation
 from lalliance_agents.agent.performer import Performer
 from lalliance_agents.agent.reports import Reports
 from lalliance_agents.agent.team import Team
-from lalliance_agents.bus.base import Bus, Delivery, Publication, Sample
-from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.bus.base import Bus, Delivery, Publication, Registration, Sample
+from lalliance_agents.bus.messenger import Messenger, Receiver
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import MissionError
@@ -33,7 +33,7 @@ _log = logging.getLogger(__name__)
 
 #: How long the robot waits at its start for the answers of the world and of teammates, in real seconds.
 GREETING_TIMEOUT = 1.0
-#: Robots listened to at most: hostile names cannot fill the memory.
+#: Robots listened to at most, unless the mission itself has more: hostile names cannot fill the memory.
 MOST_TEAMMATES = 1024
 #: Time between two refreshes of the action and the report, and of the rarer greeting, in mission seconds.
 REFRESH_PERIOD = 1.0
@@ -96,11 +96,14 @@ class Robot:
         self._messenger = Messenger(bus, self._keys, name, incarnation, self._clock.now)
         self._reports = Reports(self._messenger)
         self._team = Team(name, frozenset(tasks), MOST_TEAMMATES)
+        for teammate in mission.teammates(name):
+            self._team.meet(teammate, frozenset(mission.robots[teammate].tasks))
         self._performer = Performer(self._body_failed, self._body_returned)
         self._motivations: Publication | None = None
         self._trial = 0 if world else 1
         self._told: dict[str, tuple[bool, bool]] = {}
         self._broken: set[str] = set()
+        self._store_failed = False
         self._saved_version = self._version()
         self._saving: asyncio.Task[None] | None = None
         self._refresh_due = self._greeting_due = self._motivation_due = now
@@ -112,8 +115,8 @@ class Robot:
 
     async def run(self) -> Outcome:
         """Be part of the team until the mission is over; how it ended."""
-        presence = None
-        ticking = None
+        presence: Registration | None = None
+        ticking: asyncio.Task[None] | None = None
         try:
             await self._join()
             presence = await self._bus.announce_presence(self._keys.build(Kind.ALIVE, robot=self.name))
@@ -124,43 +127,53 @@ class Robot:
                 ticking.result()
             return self._over.result()
         finally:
-            await self._leave(ticking)
-            if presence is not None:
-                await presence.close()
+            try:
+                await self._leave(ticking)
+            finally:
+                if presence is not None:
+                    await presence.close()
 
     async def _join(self) -> None:
         keys, listen = self._keys, self._messenger.listen
         for task in self._repertoire:
             await listen(keys.build(Kind.ACTIVITY, task=task), self._receive_presence)
-            await listen(keys.build(Kind.SENSE_TASK, task=task), self._receive_sense)
-        await listen(keys.build(Kind.SENSE_ROBOT, robot=self.name), self._receive_body)
+        for teammate in self._team.abilities:
+            await self._listen_to(teammate)
         await listen(keys.build(Kind.HELLO), self._receive_hello)
         await self._messenger.offer(keys.build(Kind.HELLO, robot=self.name), self._own_hello)
         self._motivations = await self._bus.publication(
             keys.build(Kind.MOTIVATION, robot=self.name), Delivery.TELEMETRY
         )
-        for teammate in self._mission.teammates(self.name):
-            await self._listen_to(teammate, frozenset(self._mission.robots[teammate].tasks))
         expected = frozenset(k for k in self._mission.teammates(self.name) if self._mission.robots[k].joins == 0.0)
         self.mind.handle(RosterKnown(expected), self._clock.now())
+        questions: dict[str, Receiver] = {keys.build(Kind.HELLO): self._receive_hello}
+        if self._world:
+            body = keys.build(Kind.SENSE_ROBOT, robot=self.name)
+            for task in self._repertoire:
+                await listen(keys.build(Kind.SENSE_TASK, task=task), self._receive_sense)
+            await listen(body, self._receive_body)
+            questions |= {keys.build(Kind.SENSE_TASK): self._receive_sense, body: self._receive_body}
         self._greet()
         await asyncio.gather(
-            self._messenger.ask(keys.build(Kind.HELLO), self._receive_hello, timeout=GREETING_TIMEOUT),
-            self._messenger.ask(keys.build(Kind.SENSE_TASK), self._receive_sense, timeout=GREETING_TIMEOUT),
-            self._messenger.ask(
-                keys.build(Kind.SENSE_ROBOT, robot=self.name), self._receive_body, timeout=GREETING_TIMEOUT
-            ),
+            *(
+                self._messenger.ask(pattern, receiver, timeout=GREETING_TIMEOUT)
+                for pattern, receiver in questions.items()
+            )
         )
 
     async def _leave(self, ticking: asyncio.Task[None] | None) -> None:
+        ending = set(self._listening)
         if ticking is not None:
-            ticking.cancel()
-            await asyncio.wait({ticking})
-        for task in self._listening:
+            ending.add(ticking)
+        for task in ending:
             task.cancel()
-        await self._performer.close()
+        self._performer.stop_all()
+        # The last report goes out first: who waits for it need not wait for a body that cleans up slowly.
         self._reports.send(self.mind, self._clock.now(), final=True)
         await self._messenger.close()
+        if ending:
+            await asyncio.wait(ending)
+        await self._performer.close()
         if self._motivations is not None:
             await self._motivations.close()
         if self._saving is not None:
@@ -193,15 +206,18 @@ class Robot:
             self._enter_trial(message.trial, message.learning)
 
     def _receive_hello(self, _: Key, message: Message) -> None:
-        if isinstance(message, Hello):
-            shared = frozenset(message.tasks) & self._repertoire.keys()
-            if shared and not self._team.knows(message.sender) and not self._team.full:
-                listening = asyncio.create_task(self._listen_to(message.sender, frozenset(message.tasks)))
-                self._listening.add(listening)
-                listening.add_done_callback(self._listening.discard)
+        if not isinstance(message, Hello):
+            return
+        tasks = frozenset(message.tasks)
+        if self._team.knows(message.sender):
+            self._team.meet(message.sender, tasks)
+        elif tasks & self._repertoire.keys() and not self._team.full:
+            self._team.meet(message.sender, tasks)
+            listening = asyncio.create_task(self._listen_to(message.sender))
+            self._listening.add(listening)
+            listening.add_done_callback(self._listening.discard)
 
-    async def _listen_to(self, teammate: str, tasks: frozenset[str]) -> None:
-        self._team.meet(teammate, tasks)
+    async def _listen_to(self, teammate: str) -> None:
         await self._messenger.listen(self._keys.build(Kind.HEARTBEAT, robot=teammate), self._receive_presence)
 
     def _enter_trial(self, trial: int, learning: str) -> None:
@@ -210,6 +226,7 @@ class Robot:
         if self._trial == 0:
             self._reports.begin()
         self._trial = trial
+        self._performer.stop_all()
         self._told.clear()
         for one in self._repertoire.values():
             one.sensed = None
@@ -217,13 +234,15 @@ class Robot:
         self.mind.handle(TrialStarted(translate.learning(learning)), self._clock.now())
 
     def _feel(self, one: BehaviorSet) -> None:
-        """Ask a behaviour set how its task stands, and tell the mind if that has changed."""
+        """Ask a behaviour set how its task stands, and tell the mind if that has changed; not before the first trial."""
+        if self._trial == 0:
+            return
         try:
             felt = bool(one.applicable()), bool(one.complete())
         except Exception:
             if one.task not in self._broken:
                 self._broken.add(one.task)
-                _log.exception("sensing of %r failed; taken as not applicable", one)
+                _log.exception("sensing of %s failed; taken as not applicable", described(one))
             felt = False, False
         if self._told.get(one.task) != felt:
             self._told[one.task] = felt
@@ -247,9 +266,8 @@ class Robot:
             due += (missed + 1) * period
 
     def _tick(self, now: float) -> None:
-        if self._trial > 0:
-            for one in self._repertoire.values():
-                self._feel(one)
+        for one in self._repertoire.values():
+            self._feel(one)
         for command in self.mind.tick(now):
             self._perform(command)
         if now >= self._refresh_due:
@@ -316,5 +334,8 @@ class Robot:
         try:
             await asyncio.to_thread(self._catalog.save, learned)
             self._saved_version = version
+            self._store_failed = False
         except OSError as error:
-            _log.warning("learned times not stored: %s", error)
+            if not self._store_failed:
+                _log.warning("learned times not stored: %s; will be tried again", error)
+            self._store_failed = True

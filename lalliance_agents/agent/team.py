@@ -7,7 +7,7 @@ class Team:
     Args:
         me: the robot itself.
         tasks: the tasks it can do.
-        most: teammates it listens to at most.
+        most: the number of teammates from which on no stranger is taken in.
     """
 
     def __init__(self, me: str, tasks: frozenset[str], most: int) -> None:
@@ -19,7 +19,7 @@ class Team:
 
     def meet(self, robot: str, tasks: frozenset[str]) -> None:
         """Remember that `robot` can do `tasks`."""
-        if robot != self._me and len(self.abilities) < self._most:
+        if robot != self._me:
             self.abilities[robot] = tasks & self._tasks
 
     def knows(self, robot: str) -> bool:
@@ -28,5 +28,5 @@ class Team:
 
     @property
     def full(self) -> bool:
-        """Whether no further teammate is taken in."""
+        """Whether no further stranger is to become a teammate."""
         return len(self.abilities) >= self._most

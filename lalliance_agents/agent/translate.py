@@ -7,7 +7,7 @@ from lalliance_agents.agent.behavior import TaskSense
 from lalliance_agents.model.events import Announce, Decision, Factors, Heard, Sensed, Teammate
 from lalliance_agents.model.parameters import Learning
 from lalliance_agents.wire.keys import Kind
-from lalliance_agents.wire.messages import Activity, Heartbeat, Scalars, TaskState
+from lalliance_agents.wire.messages import LONGEST, Activity, Heartbeat, Scalars, TaskState
 
 
 def heard(message: Activity | Heartbeat) -> Heard:
@@ -36,8 +36,12 @@ def announcement(command: Announce, trial: int) -> tuple[Kind, dict[str, Any]]:
     """The kind and the fields of the message that announces the current activity."""
     if command.task is None:
         return Kind.HEARTBEAT, {"trial": trial}
-    fields = {"task": command.task, "trial": trial, "active_for": command.active_for, "expected": command.expected}
-    return Kind.ACTIVITY, fields
+    return Kind.ACTIVITY, {
+        "task": command.task,
+        "trial": trial,
+        "active_for": _seconds(command.active_for),
+        "expected": _seconds(command.expected),
+    }
 
 
 def decision(made: Decision, trial: int) -> dict[str, Any]:
@@ -47,11 +51,16 @@ def decision(made: Decision, trial: int) -> dict[str, Any]:
         "task": made.task,
         "cause": made.cause.value,
         "other": made.other,
-        "active_for": max(made.active_for, 0.0),
+        "active_for": _seconds(made.active_for),
         "trial": trial,
         "factors": scalars(made.factors),
         "teammates": [scalars(mate) for mate in made.teammates],
     }
+
+
+def _seconds(length: float) -> float:
+    """A length of time as the wire can carry it; one that is not known counts as the longest, in seconds."""
+    return max(0.0, length) if length <= LONGEST else LONGEST
 
 
 def scalars(record: Factors | Teammate) -> Scalars:

@@ -1,7 +1,8 @@
 """One participant's messages on a bus: a header on each that leaves, a check of each that comes.
 
 What leaves is numbered and stamped. What comes is dropped if it does not decode, if somebody speaks for another, or if it is
-no news; every drop is counted by its reason and logged once per sender and reason. No message can raise an error here.
+no news; every drop is counted by its reason and logged once per key's owner and reason, as far as the limit of such lines. No
+message can raise an error here: a receiver that fails has lost the one message, and the first such failure is logged.
 """
 
 import logging
@@ -23,6 +24,9 @@ _DELIVERY = {
     Kind.MOTIVATION: Delivery.TELEMETRY,
     Kind.LINK: Delivery.TELEMETRY,
 }
+
+#: Lines about dropped messages at most: whoever makes up names cannot fill the log, nor the memory of what was logged.
+MOST_LINES = 1000
 
 Receiver = Callable[[Key, Message], None]
 
@@ -91,26 +95,39 @@ class Messenger:
 
     def take(self, sample: Sample, receiver: Receiver) -> None:
         """Check one sample and hand it on if it is a fresh message of another participant."""
+        source = "an unknown key"
         try:
             key = self.keys.parse(sample.key)
-            if key.robot == self.me and key.kind is not Kind.SENSE_ROBOT:
+            if key.speaker == self.me:
                 return
+            source = key.speaker or sample.key
             message = decode_at(key, sample.payload)
         except MessageError as error:
-            self.drop(error.reason, sample.key, str(error))
+            self.drop(error.reason, source, str(error))
             return
-        if not self._freshness.admit((message.sender, key.stream), message.incarnation, message.seq):
-            self.drop("stale", message.sender)
+        if not self._freshness.admit(key.stream, message.incarnation, message.seq):
+            self.drop("stale", source)
             return
         self.received += 1
-        receiver(key, message)
+        try:
+            receiver(key, message)
+        except Exception:
+            if self._is_first("receiver", source):
+                _log.exception("a message of %s could not be used: its receiver failed", source)
+            self.dropped["receiver"] += 1
 
     def drop(self, reason: str, source: str, detail: str = "") -> None:
         """Count a message that is not used, and log the first of its source and reason."""
         self.dropped[reason] += 1
-        if (source, reason) not in self._logged and reason != "stale" and len(self._logged) < 1000:
-            self._logged.add((source, reason))
+        if reason != "stale" and self._is_first(reason, source):
             _log.warning("dropping messages of %s: %s", source, detail or reason)
+
+    def _is_first(self, reason: str, source: str) -> bool:
+        """Whether this is the first time, so far as it can be told, and is to be logged."""
+        if (source, reason) in self._logged or len(self._logged) >= MOST_LINES:
+            return False
+        self._logged.add((source, reason))
+        return True
 
     async def close(self) -> None:
         """Stop listening and answering."""

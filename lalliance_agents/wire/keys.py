@@ -20,7 +20,8 @@ Example: robot `lifter` of mission `warehouse` on task `crate-1` announces itsel
 `Key(Kind.ACTIVITY, robot="lifter", task="crate-1")`.
 
 Names are 1 to 64 of A-Z a-z 0-9 _ -, so a name is always one chunk and never a wildcard. A chunk that begins with `@` is
-not matched by `*` or `**`: recorders must subscribe to those keys by name.
+not matched by `*` or `**`: recorders must subscribe to those keys by name. Who takes part without being a robot has a name
+that begins with `@`, which no robot can have.
 """
 
 import re
@@ -31,6 +32,10 @@ from lalliance_agents.errors import MessageError
 
 ROOT = "lalliance"
 NAME_PATTERN = r"^[A-Za-z0-9_-]{1,64}$"
+SENDER_PATTERN = r"^@?[A-Za-z0-9_-]{1,64}$"
+
+#: The world server, as a sender.
+WORLD = "@world"
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
@@ -62,11 +67,19 @@ class Key(NamedTuple):
     task: str | None = None
 
     @property
+    def speaker(self) -> str | None:
+        """Who alone may speak on this key: the robot in it, or the world."""
+        return WORLD if self.kind in _OF_WORLD else self.robot
+
+    @property
     def stream(self) -> tuple[str | None, str | None]:
         """What a newer message replaces: all activity and heartbeats of a robot are one stream, its presence."""
         if self.kind in {Kind.ACTIVITY, Kind.HEARTBEAT}:
             return ("presence", self.robot)
         return (self.kind.format(robot=self.robot, task=self.task), None)
+
+
+_OF_WORLD = {Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.EVENT, Kind.STATUS}
 
 
 def _shapes() -> dict[tuple[str, ...], Kind]:

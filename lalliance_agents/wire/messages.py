@@ -3,7 +3,8 @@
 The header says which version of this schema the sender speaks, who it is, which life of it this is (`incarnation`: a
 restarted robot is not its ghost), and where in that life (`seq`). `at` is the sender's own mission time and informative:
 nothing compares the clocks of two machines. Fields that a receiver does not know are ignored, so that fields can be added;
-any other change is a new version. Whatever bytes come in, `decode` returns a checked message or raises `MessageError`.
+any other change is a new version. Whatever bytes come in, `decode` returns a checked message or raises `MessageError`, whose
+text is one short line; telling what is wrong with a large message takes hardly longer than reading a right one.
 """
 
 from typing import Annotated, Any, Literal, TypeVar
@@ -12,16 +13,22 @@ import msgpack
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lalliance_agents.errors import MessageError
-from lalliance_agents.wire.keys import NAME_PATTERN, Key, Kind
+from lalliance_agents.wire.keys import NAME_PATTERN, SENDER_PATTERN, Key, Kind
 
 VERSION: Literal[1] = 1
 
 #: Larger messages are dropped unread, in bytes: room for the status of a mission with some thousand tasks.
 MAX_PAYLOAD = 256 * 1024
 
+#: With more faults than this the first is not looked up: pydantic would spell out all of them.
+_MOST_FAULTS = 20
+
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+Sender = Annotated[str, Field(pattern=SENDER_PATTERN)]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
-Seconds = Annotated[float, Field(ge=0, le=1e12)]
+#: The longest time that can be said, in seconds.
+LONGEST = 1e12
+Seconds = Annotated[float, Field(ge=0, le=LONGEST)]
 Scalars = dict[str, str | int | float | bool | None]
 
 
@@ -33,7 +40,7 @@ class Message(BaseModel):
     )
 
     v: Literal[1] = VERSION
-    sender: Name
+    sender: Sender
     incarnation: Count
     seq: Count
     at: Seconds
@@ -59,7 +66,7 @@ class Heartbeat(Message):
 class Hello(Message):
     """The tasks a robot can do; used only to choose whom to listen to."""
 
-    tasks: list[Name]
+    tasks: Annotated[list[Name], Field(fail_fast=True)]
 
 
 class Action(Message):
@@ -87,7 +94,7 @@ class BodyState(Message):
     mission: Literal["waiting", "running", "complete", "failed"]
     trial: Count
     learning: Literal["active", "adaptive"]
-    failures: list[str] = []
+    failures: Annotated[list[str], Field(fail_fast=True)] = []
 
 
 class DecisionMade(Message):
@@ -100,13 +107,13 @@ class DecisionMade(Message):
     active_for: Seconds
     trial: Count
     factors: Scalars
-    teammates: list[Scalars]
+    teammates: Annotated[list[Scalars], Field(fail_fast=True)]
 
 
 class Motivations(Message):
     """All motivations of a robot, each with its factors."""
 
-    active: list[Name]
+    active: Annotated[list[Name], Field(fail_fast=True)]
     sets: dict[Name, Scalars]
 
 
@@ -198,9 +205,16 @@ def decode(kind: type[M], payload: bytes) -> M:
     try:
         return kind.model_validate(document)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise MessageError("content", f"{where}: {first['type']}") from None
+        raise MessageError("content", _first_fault(error)) from None
+
+
+def _first_fault(error: ValidationError) -> str:
+    if error.error_count() > _MOST_FAULTS:
+        return f"{error.error_count()} faults"
+    first = error.errors(include_url=False, include_input=False)[0]
+    # A place can hold any text that came as a key of a map.
+    where = ".".join(str(part) for part in first["loc"])[:80]
+    return f"{where if where.isprintable() else repr(where)}: {first['type']}"
 
 
 def _unpack(payload: bytes) -> Any:
@@ -220,8 +234,8 @@ def decode_at(key: Key, payload: bytes) -> Message:
     if body is None:
         raise MessageError("key", f"{key.kind.name} carries no message")
     message = decode(body, payload)
-    if key.kind is not Kind.SENSE_ROBOT and key.robot is not None and message.sender != key.robot:
-        raise MessageError("sender", f"{message.sender} on a key of {key.robot}")
+    if message.sender != key.speaker:
+        raise MessageError("sender", f"{message.sender} on a key of {key.speaker}")
     if isinstance(message, Activity) and message.task != key.task:
         raise MessageError("task", f"{message.task} on a key of {key.task}")
     return message

@@ -1,0 +1,131 @@
+"""The messenger: what is dropped, what is counted, and that nothing which comes can raise."""
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from lalliance_agents.bus import messenger as module
+from lalliance_agents.bus.base import Sample
+from lalliance_agents.bus.memory import MemoryBus, MemoryHub
+from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
+from lalliance_agents.wire.messages import BODY_OF, Heartbeat, Message, encode
+
+pytestmark = pytest.mark.virtual_time
+
+KEYS = Keys("m")
+
+
+def sample(kind: Kind = Kind.HEARTBEAT, robot: str = "right", **fields: Any) -> Sample:
+    """A message of `right` in its first life, on its own key, unless said otherwise."""
+    fields = {"sender": "right", "incarnation": 1, "seq": 1, "at": 0.0, "trial": 1} | fields
+    return Sample(KEYS.build(kind, robot=robot, task=fields.get("task") or "a"), encode(BODY_OF[kind](**fields)))
+
+
+class Ear:
+    """A messenger of `left` and what its receiver was given."""
+
+    def __init__(self, me: str = "left") -> None:
+        self.heard: list[tuple[str, int]] = []
+        self.messenger = Messenger(MemoryBus(MemoryHub()), KEYS, me, 1, lambda: 0.0)
+
+    def take(self, *samples: Sample) -> None:
+        for one in samples:
+            self.messenger.take(one, self._receive)
+
+    def _receive(self, key: Key, message: Message) -> None:
+        self.heard.append((message.sender, message.seq))
+
+
+async def test_only_fresh_messages_of_others_who_speak_for_themselves_are_handed_on(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    ear = Ear()
+    ear.take(
+        sample(seq=5),
+        sample(seq=5),  # doubled
+        sample(seq=4),  # overtaken
+        sample(Kind.ACTIVITY, task="a", active_for=1.0, expected=2.0, seq=3),  # the same stream
+        sample(Kind.HELLO, tasks=["a"], seq=3),  # another stream
+        sample(incarnation=2, seq=1),  # a new life
+        sample(seq=99),  # its ghost
+        sample(robot="left", sender="left", seq=9),  # itself
+        sample(robot="third"),  # somebody speaks for another
+        sample(Kind.SENSE_TASK, learning="active", applicable=True, complete=True, progress=1.0),  # or for the world
+        Sample(KEYS.build(Kind.HEARTBEAT, robot="right"), b"\xc1"),
+        Sample("lalliance/m/heartbeat/*", b""),
+        Sample("lalliance/other/heartbeat/right", b""),
+        Sample(KEYS.build(Kind.CHAOS_RULES), b""),
+    )
+    assert ear.heard == [("right", 5), ("right", 3), ("right", 1)]
+    assert ear.messenger.received == 3
+    assert dict(ear.messenger.dropped) == {"stale": 4, "sender": 2, "msgpack": 1, "key": 3}
+    assert [record.message for record in caplog.records] == [
+        "dropping messages of third: sender: right on a key of third",
+        "dropping messages of @world: sender: right on a key of @world",
+        "dropping messages of right: msgpack: FormatError",
+        "dropping messages of an unknown key: key: 'lalliance/m/heartbeat/*' is not a key of this mission",
+        "dropping messages of lalliance/m/@chaos/rules: key: CHAOS_RULES carries no message",
+    ]
+
+
+async def test_a_robot_called_world_is_no_world_and_the_world_does_not_hear_itself() -> None:
+    world = Ear(WORLD)
+    world.take(
+        sample(Kind.ACTION, robot="world", sender="world", task="a", fewest=0),
+        sample(Kind.SENSE_ROBOT, sender=WORLD, mission="running", learning="active"),
+    )
+    assert world.heard == [("world", 1)]
+    assert not world.messenger.dropped
+
+
+async def test_drops_are_logged_once_per_source_and_reason_and_not_without_end(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "MOST_LINES", 5)
+    ear = Ear()
+    for number in range(100):
+        ear.take(Sample(KEYS.build(Kind.HEARTBEAT, robot="right"), b""))
+        ear.take(Sample(KEYS.build(Kind.ACTIVITY, robot="right", task=f"t{number}"), b""))
+        ear.take(Sample(f"lalliance/m/heartbeat/\n{number} ERROR", b""))
+        ear.take(Sample(KEYS.build(Kind.HELLO, robot=f"made-up-{number}"), b""))
+    assert ear.messenger.dropped == {"msgpack": 300, "key": 100}
+    assert len(caplog.records) == 5
+    assert all(record.message.isprintable() for record in caplog.records)
+
+
+async def test_what_a_receiver_raises_is_its_own_and_logged_once(caplog: pytest.LogCaptureFixture) -> None:
+    def stumble(_: Key, message: Message) -> None:
+        raise KeyError(message.seq)
+
+    ear = Ear()
+    for seq in range(3):
+        ear.messenger.take(sample(seq=seq), stumble)
+    ear.take(sample(seq=3))
+    assert ear.heard == [("right", 3)]
+    assert ear.messenger.dropped == {"receiver": 3}
+    assert [record.levelno for record in caplog.records] == [logging.ERROR]
+
+
+async def test_messages_and_answers_reach_a_receiver_over_the_bus_numbered_and_signed() -> None:
+    hub = MemoryHub()
+    heard: list[Message] = []
+    clock: Callable[[], float] = lambda: 12.5  # noqa: E731
+    async with MemoryBus(hub) as here, MemoryBus(hub) as there:
+        left, right = Messenger(here, KEYS, "left", 7, clock), Messenger(there, KEYS, "right", 1, clock)
+        await right.listen(KEYS.build(Kind.HEARTBEAT), lambda _, message: heard.append(message))
+        hello = KEYS.build(Kind.HELLO, robot="left")
+        await left.offer(hello, lambda _: [Sample(hello, left.compose(Kind.HELLO, tasks=["a"]))])
+        left.send(Kind.HEARTBEAT, trial=1)
+        answered = await right.ask(KEYS.build(Kind.HELLO), lambda _, message: heard.append(message), timeout=1.0)
+        assert answered == 1
+        await right.close()
+        left.send(Kind.HEARTBEAT, trial=2)
+        await left.close()
+        assert await right.ask(KEYS.build(Kind.HELLO), lambda *_: None, timeout=1.0) == 0
+    first = heard[0]
+    assert (type(first), first.sender, first.incarnation, first.seq, first.at) == (Heartbeat, "left", 7, 1, 12.5)
+    assert [m.seq for m in heard] == [1, 2]
+    assert (left.sent, right.received) == (2, 2)

@@ -1,0 +1,196 @@
+"""The world server over the memory bus: what it answers, refreshes and waits for, and what it does not listen to."""
+
+import asyncio
+import math
+from itertools import pairwise
+from types import TracebackType
+from typing import Any, Self
+
+import pytest
+
+from lalliance_agents.bus.base import Delivery
+from lalliance_agents.bus.memory import MemoryBus, MemoryHub
+from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.mission_file import parse_mission
+from lalliance_agents.wire.keys import Key, Keys, Kind
+from lalliance_agents.wire.messages import BodyState, Event, Message, Status, TaskState
+from world_server.environments.base import TaskView
+from world_server.environments.task_pool import TaskPool
+from world_server.server import LINGER, WorldServer
+
+pytestmark = pytest.mark.virtual_time
+
+PAIR = """
+name: pair
+tasks: {a: {}, b: {}}
+robots:
+  left: {tasks: {a: 4, b: 8}}
+  right: {tasks: {a: 8, b: 4}}
+"""
+
+
+class Served:
+    """A world server, and a test that plays the robots and hears all that the world says."""
+
+    def __init__(self, text: str = PAIR, **more: Any) -> None:
+        self.mission = parse_mission(text, "test.yaml")
+        self.keys = Keys(self.mission.name)
+        self.hub = MemoryHub()
+        self.bus = MemoryBus(self.hub)
+        self.server = WorldServer(self.mission, bus=MemoryBus(self.hub), incarnation=1, **more)
+        self.heard: list[tuple[float, Message]] = []
+        self.voices: dict[str, Messenger] = {}
+        self.loop = asyncio.get_running_loop()
+        self.task: asyncio.Task[dict[str, Any]]
+
+    def voice(self, name: str) -> Messenger:
+        if name not in self.voices:
+            self.voices[name] = Messenger(self.bus, self.keys, name, 1, self.loop.time)
+        return self.voices[name]
+
+    def hear(self, _: Key, message: Message) -> None:
+        self.heard.append((self.loop.time(), message))
+
+    async def __aenter__(self) -> Self:
+        for kind in (Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.EVENT, Kind.STATUS):
+            await self.voice("@ear").listen(self.keys.build(kind), self.hear)
+        self.task = asyncio.create_task(self.server.run())
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.task.cancel()
+        await asyncio.wait({self.task})
+        await self.bus.close()
+
+    async def appear(self, *robots: str) -> None:
+        for robot in robots:
+            await self.bus.announce_presence(self.keys.build(Kind.ALIVE, robot=robot))
+        await asyncio.sleep(0.1)
+
+    async def work(self, robot: str, task: str, seconds: int) -> None:
+        for _ in range(seconds):
+            self.voice(robot).send(Kind.ACTION, task=task, trial=1, fewest=0)
+            await asyncio.sleep(1.0)
+
+    def events(self) -> list[str]:
+        return [message.text for _, message in self.heard if isinstance(message, Event)]
+
+    async def ask(self, kind: Kind, **names: str) -> list[tuple[Key, Message]]:
+        answers: list[tuple[Key, Message]] = []
+        asker = Messenger(self.bus, self.keys, "late", 1, self.loop.time)
+        await asker.ask(
+            self.keys.build(kind, **names), lambda key, message: answers.append((key, message)), timeout=1.0
+        )
+        return answers
+
+
+async def test_who_comes_late_is_told_by_query_all_of_it_or_what_it_asks_for() -> None:
+    async with Served() as served:
+        await served.appear("left", "right")
+        await served.work("left", "a", 2)
+        answers = await served.ask(Kind.SENSE_TASK)
+        assert [key.task for key, _ in answers] == ["a", "b"]
+        assert [m.progress for _, m in answers if isinstance(m, TaskState)] == pytest.approx([0.5, 0.0], abs=0.02)
+        assert [key.task for key, _ in await served.ask(Kind.SENSE_TASK, task="b")] == ["b"]
+        assert [key.robot for key, _ in await served.ask(Kind.SENSE_ROBOT, robot="left")] == ["left"]
+        assert [key.robot for key, _ in await served.ask(Kind.SENSE_ROBOT)] == ["left", "right"]
+        assert await served.ask(Kind.SENSE_ROBOT, robot="stranger") == []
+
+
+async def test_what_robots_need_is_refreshed_every_second_and_changes_are_told_at_once() -> None:
+    async with Served() as served:
+        await served.appear("left", "right")
+        await served.work("left", "a", 8)
+        for kind in (TaskState, BodyState):
+            instants = [at for at, m in served.heard if isinstance(m, kind)]
+            assert max(later - at for at, later in pairwise(instants)) <= 1.1
+        done = next(at for at, m in served.heard if isinstance(m, TaskState) and m.complete)
+        told = next(at for at, m in served.heard if isinstance(m, Event) and m.kind == "complete")
+        assert done == told
+        [elapsed] = [m.elapsed for _, m in served.heard if isinstance(m, Event) and m.kind == "complete"]
+        assert told <= elapsed + 0.15
+        assert len([m for _, m in served.heard if isinstance(m, Status)]) >= 4 * 7
+
+
+@pytest.mark.parametrize("final", [True, False])
+async def test_the_last_reports_are_waited_for_and_not_for_ever(final: bool) -> None:
+    report = {"sent": 3, "received": 2, "dropped": {}, "teammates": {}, "ticks": 5, "missed": 0}
+    async with Served() as served:
+        await served.appear("left", "right")
+        for robot in ("left", "right", "stranger"):
+            served.voice(robot).send(Kind.LINK, **report)
+        await asyncio.gather(served.work("left", "a", 5), served.work("right", "b", 5))
+        ended = served.loop.time()
+        assert not served.task.done()
+        for robot in ("left", "right") if final else ("left",):
+            served.voice(robot).send(Kind.LINK, **report | {"sent": 4}, final=True)
+        summary = await served.task
+        assert summary["complete"]
+        assert summary["messages"]["sent"] == (8 if final else 7)
+        assert served.loop.time() - ended == pytest.approx(0.1 if final else LINGER - 1.0, abs=0.2)
+        await asyncio.sleep(0.01)
+        assert {m.mission for _, m in served.heard[-2:] if isinstance(m, BodyState | Status)} == {"complete"}
+
+
+async def test_a_world_does_not_begin_before_somebody_is_there_however_patient_it_was() -> None:
+    late = PAIR.replace("tasks: {a: 8", "joins: 5, tasks: {a: 8")
+    async with Served(late, patience=3.0) as served:
+        await asyncio.sleep(10.0)
+        assert served.events() == []
+        await served.appear("left")
+        await asyncio.sleep(0.2)
+        assert served.events() == ["left is there", "trial 1 begins (adaptive learning)"]
+
+
+async def test_strangers_and_hostile_presences_change_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    async with Served() as served:
+        for name in ("stranger", "le ft", "left\n", "@left", "x" * 100):
+            await served.bus.announce_presence(f"lalliance/pair/alive/{name}")
+        await served.appear("left", "right")
+        stranger = served.voice("stranger")
+        stranger.send(Kind.ACTION, task="a", trial=1, fewest=0)
+        stranger.send(Kind.ACTION, key_robot="left", task="a", trial=1, fewest=0)
+        for name in ("left", "@world"):
+            for payload in (b"", b"\xc1", b"x" * 1000):
+                served.bus.put(served.keys.build(Kind.ACTION, robot=name), payload, Delivery.STATE)
+        await asyncio.sleep(1.0)
+        assert served.events() == ["left is there", "right is there", "trial 1 begins (adaptive learning)"]
+        [status] = [m for _, m in served.heard if isinstance(m, Status)][-1:]
+        assert status.robots == {name: {"present": True, "task": None} for name in ("left", "right")}
+        assert served.server._messenger.dropped == {"stranger": 1, "sender": 1, "msgpack": 3, "key": 3}
+        assert all(record.message.isprintable() for record in caplog.records if record.levelname == "WARNING")
+        await served.work("left", "a", 5)
+        assert served.events()[-1] == "a completed by left"
+
+
+async def test_a_progress_that_is_no_share_does_not_stop_the_world(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Careless(TaskPool):
+        def sense(self) -> dict[str, TaskView]:
+            odd = {"a": math.nan, "b": 1 + 1e-9}
+            return {task: TaskView(view.complete, view.applicable, odd[task]) for task, view in super().sense().items()}
+
+    monkeypatch.setattr("world_server.environments.create", Careless)
+    async with Served() as served:
+        await served.appear("left", "right")
+        await served.work("left", "a", 5)
+        assert served.events()[-1] == "a completed by left"
+        assert {m.progress for _, m in served.heard if isinstance(m, TaskState)} == {0.0, 1.0}
+
+
+async def test_two_robots_that_join_late_are_both_ordered() -> None:
+    """Orders are carried out once per number: two of them must never have the same."""
+    late = PAIR.replace("deadline", "") + "  c: {joins: 2, tasks: {a: 1}}\n  d: {joins: 4, tasks: {b: 1}}\n"
+    async with Served(late) as served:
+        await served.appear("left", "right")
+        carried_out: dict[Any, str] = {}
+        for _ in range(80):
+            await asyncio.sleep(0.1)
+            for _, m in served.heard:
+                if isinstance(m, Event) and m.kind == "order" and m.details["number"] not in carried_out:
+                    carried_out[m.details["number"]] = f"{m.details['deed']} {m.robot}"
+                    assert m.robot is not None
+                    await served.appear(m.robot)
+        assert sorted(carried_out.values()) == ["start c", "start d"]
+        assert {"c is there", "d is there"} <= set(served.events())
