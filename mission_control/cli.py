@@ -14,7 +14,7 @@ import signal
 import sys
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
 
 import typer
 
@@ -74,7 +74,7 @@ def run(
 
     if connect is not None and listen is not None:
         raise UserError("--connect uses a router that runs already, --listen starts one; expected one of the two")
-    mission = _load(path, seed)
+    mission = _load(path, seed, part="team")
     console = Console(stderr=as_json)
     plan = Plan(path.resolve(), mission, speed, connect, listen, None if learned is None else learned.resolve())
     for warning in mission.warnings():
@@ -125,7 +125,7 @@ def world(
 ) -> None:
     """Run the world server of a mission."""
     _follow(parent)
-    mission = _load(path, seed)
+    mission = _load(path, seed, part="world")
 
     async def serve() -> dict[str, Any]:
         from lalliance_agents.agent.catalog import fresh_incarnation
@@ -168,7 +168,7 @@ def robot(
 ) -> None:
     """Run one robot of a mission until the mission is over."""
     _follow(parent)
-    mission = _load(path, seed, whole=False)
+    mission = _load(path, seed, part="robot")
     if name not in mission.robots:
         raise UserError(f"{path}: no robot {name!r} in this mission; expected one of {', '.join(mission.robots)}")
 
@@ -202,7 +202,7 @@ def robot(
 @app.command()
 def check(path: MissionPath) -> None:
     """Check a mission file; prints what it contains, or the first fault."""
-    mission = _load(path, None)
+    mission = _load(path, None, part="team")
     for warning in mission.warnings():
         _warn(f"{path}: {warning}")
     typer.echo(
@@ -219,13 +219,19 @@ def schema() -> None:
     typer.echo(json.dumps(mission_schema(), indent=2))
 
 
-def _load(path: Path, seed: int | None, *, whole: bool = True) -> "Mission":
-    """The checked mission at `path`; as a `whole`, with the environment's options, which are no business of a robot's."""
-    if whole:
-        from mission_control.missions import load
+def _load(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":
+    """The checked mission at `path`.
+
+    Whole for a team; without the robots' own code for a world, and without the world's environment for a robot.
+    """
+    if part == "robot":
+        from lalliance_agents.mission_file import load_mission
+
+        mission = load_mission(path)
     else:
-        from lalliance_agents.mission_file import load_mission as load
-    mission = load(path)
+        from mission_control.missions import load
+
+        mission = load(path, for_team=part == "team")
     return mission if seed is None else mission.model_copy(update={"seed": seed})
 
 

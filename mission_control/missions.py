@@ -6,14 +6,19 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
+from lalliance_agents.agent.behavior import find_factory
 from lalliance_agents.config import Mission
-from lalliance_agents.errors import MissionError
-from lalliance_agents.mission_file import load_mission_text
+from lalliance_agents.errors import BehaviorError, MissionError
+from lalliance_agents.mission_file import MissionText, load_mission_text
 from world_server.environments import BUILT_IN, check_options, environment_class
 
 
-def load(path: Path) -> Mission:
+def load(path: Path, *, for_team: bool) -> Mission:
     """The mission in the file at `path`.
+
+    Args:
+        path: where it is.
+        for_team: whether the robots are to run here too, so that their own behaviour sets must be there.
 
     Raises:
         MissionError: the file does not hold a mission that can be run.
@@ -29,7 +34,18 @@ def load(path: Path) -> Mission:
         raise text.error(error) from None
     except MissionError as error:
         raise text.wrong(("environment", "kind"), str(error).removeprefix("environment.kind: ")) from None
+    if for_team:
+        _check_behaviors(mission, text)
     return mission
+
+
+def _check_behaviors(mission: Mission, text: MissionText) -> None:
+    for name, robot in mission.robots.items():
+        try:
+            if robot.behaviors is not None:
+                find_factory(robot.behaviors)
+        except BehaviorError as error:
+            raise text.wrong(("robots", name, "behaviors"), str(error)) from None
 
 
 def mission_schema() -> dict[str, Any]:

@@ -82,11 +82,11 @@ def described(one: object) -> str:
 Factory = Callable[[], Iterable[BehaviorSet]]
 
 
-def load_behaviors(place: str) -> list[BehaviorSet]:
-    """The behaviour sets that the factory at `package.module:factory` makes.
+def find_factory(place: str) -> Factory:
+    """The factory at `package.module:factory`, found and not yet called.
 
     Raises:
-        BehaviorError: there is no such factory, or it does not return behaviour sets.
+        BehaviorError: there is none.
     """
     module_name, _, path = place.partition(":")
     try:
@@ -102,9 +102,19 @@ def load_behaviors(place: str) -> list[BehaviorSet]:
         raise BehaviorError(
             f"behaviors {place!r} is {type(found).__name__}, expected a function that returns behaviour sets"
         )
+    factory: Factory = found
+    return factory
+
+
+def load_behaviors(place: str) -> list[BehaviorSet]:
+    """The behaviour sets that the factory at `package.module:factory` makes.
+
+    Raises:
+        BehaviorError: there is no such factory, or it does not return behaviour sets.
+    """
+    factory = find_factory(place)
     try:
-        made = found()
-        sets = list(made)
+        sets = list(factory())
     except Exception as error:
         raise BehaviorError(f"behaviors {place!r} failed: {type(error).__name__}: {error}") from error
     for one in sets:

@@ -70,6 +70,10 @@ FILES = {
         changed("deadline", "environment: {kind: task_pool, handover: restart}\ndeadline"),
         "m.yaml:7: environment.handover: unknown field; did you mean 'hand_over'?",
     ),
+    "behaviour sets that are not there": (
+        changed("two: {", "two: {behaviors: 'no_such_module:make', "),
+        "m.yaml:5: robots.two.behaviors: behaviors 'no_such_module:make' cannot be loaded: ModuleNotFoundError",
+    ),
     "a fault of an unknown robot": (
         changed("deadline", "faults: [{at: 1, robot: tow, kind: crash}]\ndeadline"),
         "m.yaml:7: faults.0.robot: 'tow' is not a robot of this mission; did you mean 'two'?",
