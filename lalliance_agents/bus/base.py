@@ -11,6 +11,7 @@ A key or pattern that is not one, or is too long, raises `ValueError` wherever i
 published is ignored and queries have no answers, while a new declaration is a mistake: `RuntimeError`.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -57,44 +58,58 @@ class Publication(Registration, Protocol):
         """Whether somebody subscribes to this key just now, as far as is known."""
 
 
-class Bus(Protocol):
+class Closing(ABC):
+    """Something that is closed on leaving its context."""
+
+    @abstractmethod
+    async def close(self) -> None:
+        """Close it; a second call does nothing."""
+
+    async def __aenter__(self) -> Self:
+        """Return it, open."""
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+        await self.close()
+
+
+class Bus(Closing):
     """One participant's connection. Leaving the context closes it and all that was declared on it."""
 
+    @abstractmethod
     def put(self, key: str, payload: bytes, delivery: Delivery) -> None:
         """Publish without waiting; lost silently while the bus is down."""
 
+    @abstractmethod
     async def publication(self, key: str, delivery: Delivery) -> Publication:
         """Declare a key that will be published on often."""
 
+    @abstractmethod
     async def subscribe(self, pattern: str, handler: Handler) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
 
+    @abstractmethod
     async def answer(self, pattern: str, handler: Answer) -> Registration:
         """Answer queries that match `pattern` with the samples that `handler` returns for the query's pattern and payload.
 
         An answer's key must be matched by the query's pattern; if one is not, the query gets no answer from here.
         """
 
+    @abstractmethod
     async def query(self, pattern: str, payload: bytes = b"", *, timeout: float) -> list[Sample]:  # noqa: ASYNC109 - the bus's own limit, not a cancellation
         """Ask whoever answers `pattern`; all answers that came within `timeout` seconds, possibly none."""
 
+    @abstractmethod
     async def announce_presence(self, key: str) -> Registration:
         """Be present as `key` until closed or gone, however abruptly."""
 
+    @abstractmethod
     async def watch_presence(self, pattern: str, handler: PresenceHandler) -> Registration:
         """Have `handler` called with (key, True) for each presence there is or comes, and (key, False) when it is gone.
 
         Several announcements of one key are one presence, gone with the last; a watcher that is itself one of the
         announcers may see it flicker meanwhile. While the bus is down, all are gone.
         """
-
-    async def close(self) -> None:
-        """Leave the bus; a second call does nothing."""
-
-    async def __aenter__(self) -> Self:
-        """Return the open bus."""
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close the bus."""

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
-from lalliance_agents.bus.base import Answer, Sample
+from lalliance_agents.bus.base import Answer, Bus, Sample
 from lalliance_agents.bus.patterns import check_key, matches
 from lalliance_agents.wire.messages import MAX_PAYLOAD
 
@@ -170,6 +170,22 @@ class Inbox:
             if self._rescued:
                 return self._rescued.popleft()
             return self._waiting.popleft() if self._waiting else None
+
+
+class QueuedBus(Bus):
+    """A bus whose samples wait in an inbox for the event loop."""
+
+    _inbox: Inbox
+
+    @property
+    def dropped_overflow(self) -> int:
+        """Messages dropped on arrival because too many were waiting for the loop."""
+        return self._inbox.dropped_overflow
+
+    @property
+    def dropped_oversize(self) -> int:
+        """Messages dropped on arrival because they were larger than `MAX_PAYLOAD`."""
+        return self._inbox.dropped_oversize
 
 
 class Inquiry:

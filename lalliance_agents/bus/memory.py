@@ -7,11 +7,10 @@ have is distance: no message is delayed, lost on the way or reordered, and the h
 
 import asyncio
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Generic, Self, TypeVar
+from typing import Generic, TypeVar
 
 from lalliance_agents.bus.base import Answer, Delivery, Handler, PresenceHandler, Sample
-from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, answers, check_timeout
+from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, QueuedBus, answers, check_timeout
 from lalliance_agents.bus.patterns import check_key, check_pattern, intersects, matches
 
 Raw = TypeVar("Raw")
@@ -48,7 +47,7 @@ class MemoryHub:
                 each.end()
 
 
-class MemoryBus:
+class MemoryBus(QueuedBus):
     """One participant. Built inside the event loop in which its handlers shall run."""
 
     def __init__(self, hub: MemoryHub) -> None:
@@ -59,16 +58,6 @@ class MemoryBus:
 
     def __repr__(self) -> str:
         return f"<memory bus, {'closed' if self._closed else 'open'}>"
-
-    @property
-    def dropped_overflow(self) -> int:
-        """Messages dropped on arrival because too many were waiting for the loop."""
-        return self._inbox.dropped_overflow
-
-    @property
-    def dropped_oversize(self) -> int:
-        """Messages dropped on arrival because they were larger than `MAX_PAYLOAD`."""
-        return self._inbox.dropped_oversize
 
     def put(self, key: str, payload: bytes, delivery: Delivery) -> None:  # noqa: ARG002 - all are equally urgent here
         """Publish without waiting; silently ignored once closed."""
@@ -146,16 +135,6 @@ class MemoryBus:
             self._closed = True
             self._inbox.close()
             self._hub._forget(self)
-
-    async def __aenter__(self) -> Self:
-        """Return the open bus."""
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close the bus."""
-        await self.close()
 
     def _check(self, pattern: str) -> None:
         check_pattern(pattern)

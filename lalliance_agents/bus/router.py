@@ -5,11 +5,10 @@ leaves the clients without a bus until one listens on the same endpoint again.
 """
 
 import socket
-from types import TracebackType
-from typing import Self
 
 import zenoh
 
+from lalliance_agents.bus.base import Closing
 from lalliance_agents.bus.session import (
     check_endpoint,
     close_session,
@@ -20,7 +19,7 @@ from lalliance_agents.bus.session import (
 from lalliance_agents.errors import BusError
 
 
-class Router:
+class Router(Closing):
     """A router that runs until it is closed. Leaving the context closes it.
 
     Attributes:
@@ -38,16 +37,6 @@ class Router:
     async def close(self) -> None:
         """Stop routing; a second call does nothing. Cancelled, the router still stops."""
         await close_session(self._session)
-
-    async def __aenter__(self) -> Self:
-        """Return the running router."""
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Stop routing."""
-        await self.close()
 
 
 async def open_router(listen: str) -> Router:

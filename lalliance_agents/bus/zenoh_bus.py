@@ -13,13 +13,12 @@ import asyncio
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import zenoh
 
 from lalliance_agents.bus.base import Answer, Delivery, Handler, PresenceHandler, Sample
-from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, answers, check_timeout
+from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, QueuedBus, answers, check_timeout
 from lalliance_agents.bus.patterns import check_key, check_pattern
 from lalliance_agents.bus.session import (
     check_endpoint,
@@ -73,7 +72,7 @@ async def open_bus(endpoint: str, *, timeout: float = 5.0) -> "ZenohBus":  # noq
     return ZenohBus(session, endpoint)
 
 
-class ZenohBus:
+class ZenohBus(QueuedBus):
     """One participant's connection; made by `open_bus`.
 
     Attributes:
@@ -93,16 +92,6 @@ class ZenohBus:
 
     def __repr__(self) -> str:
         return f"<zenoh bus at {self.endpoint}, {'closed' if self._closed else 'open'}>"
-
-    @property
-    def dropped_overflow(self) -> int:
-        """Messages dropped on arrival because too many were waiting for the loop."""
-        return self._inbox.dropped_overflow
-
-    @property
-    def dropped_oversize(self) -> int:
-        """Messages dropped on arrival because they were larger than `MAX_PAYLOAD`."""
-        return self._inbox.dropped_oversize
 
     def put(self, key: str, payload: bytes, delivery: Delivery) -> None:
         """Publish without waiting; lost silently while the bus is down, silently ignored once closed."""
@@ -194,16 +183,6 @@ class ZenohBus:
         for inquiry in self._inquiries:
             inquiry.finish()
         await close_session(self._session)
-
-    async def __aenter__(self) -> Self:
-        """Return the open bus."""
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close the bus."""
-        await self.close()
 
     def _expression(self, pattern: str) -> zenoh.KeyExpr:
         check_pattern(pattern)
