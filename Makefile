@@ -6,6 +6,7 @@ SETUP := .venv/.set-up
 .PHONY: demo test check clean
 
 $(SETUP): pyproject.toml constraints.txt
+	@echo "Setting up .venv: this takes about a minute, and a package index"
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	touch $@

@@ -156,7 +156,7 @@ class Mission(Record):
     deadline: Positive = 600.0
     """A trial that is not complete after this many seconds has failed."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
-    """All randomness of a run comes from this number."""
+    """All that is drawn in a run comes from this number; how the processes' times interleave does not."""
 
     @model_validator(mode="after")
     def _check_together(self) -> Self:
@@ -317,8 +317,14 @@ class Mission(Record):
         if self.parameters.architecture is Architecture.L_ALLIANCE and delay > 0.05 * mean:
             found.append(
                 f"parameters.max_delay: {delay:g} s is {delay / mean:.0%} of the mean task time ({mean:.3g} s); "
-                "above 5 % robots spend a noticeable part of the mission waiting"
+                f"above 5 % robots spend a noticeable part of the mission waiting; expected about {0.04 * mean:.1g} s"
             )
+        for task in self.tasks:
+            fastest = min(self.robots[robot].tasks[task] for robot in self.able(task))
+            if fastest > self.deadline:
+                found.append(
+                    f"tasks.{task}: its fastest robot needs {fastest:g} s, longer than the deadline of {self.deadline:g} s"
+                )
         for index, fault in enumerate(self.faults):
             if self._last_able(fault):
                 found.append(

@@ -61,6 +61,8 @@ def load_mission_text(path: Path) -> "MissionText":
     """
     raw = b""
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise MissionError(one_line(f"{path}: not a regular file; expected a mission file"))
         with path.open("rb") as file:
             raw = file.read(LARGEST + 1)
         if len(raw) <= LARGEST:

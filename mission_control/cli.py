@@ -7,6 +7,7 @@ needed, so that `lalliance --help` is quick.
 
 import asyncio
 import contextlib
+import errno
 import json
 import logging
 import os
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from lalliance_agents.config import Mission
     from mission_control.live import Lines
 
+#: A silence timeout shorter than this, in real seconds, is at the mercy of the machine's scheduling.
+SHORTEST_SILENCE = 0.15
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 T = TypeVar("T")
@@ -50,6 +53,18 @@ Learned = Annotated[
 ]
 
 
+@app.callback(invoke_without_command=True)
+def lalliance(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    """Fault-tolerant, learning task allocation for teams of different robots, without a coordinator."""
+    if version:
+        from importlib.metadata import version as installed
+
+        typer.echo(f"lalliance {installed('lalliance')}")
+        raise typer.Exit
+
+
 @app.command()
 def run(
     path: MissionPath,
@@ -66,7 +81,7 @@ def run(
     plain: Annotated[bool, typer.Option("--plain", help="One line per event instead of the live view.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Run a mission on this machine: router, world and one process per robot."""
+    """Run a mission here: router, world and robots as processes."""
     from rich.console import Console
 
     from mission_control.launch import Launcher, Plan
@@ -76,9 +91,17 @@ def run(
         raise UserError("--connect uses a router that runs already, --listen starts one; expected one of the two")
     mission = _load(path, seed, part="team")
     console = Console(stderr=as_json)
+    if learned is not None:
+        from lalliance_agents.agent.catalog import prepare
+
+        prepare(learned)
     plan = Plan(path.resolve(), mission, speed, connect, listen, None if learned is None else learned.resolve())
     for warning in mission.warnings():
         _warn(f"{path}: {warning}")
+    if (real := mission.parameters.silence_timeout / speed) < SHORTEST_SILENCE:
+        _warn(
+            f"--speed {speed:g} makes {real:.2g} real seconds of silence a failure; a busy machine may see some that are none"
+        )
 
     async def launch() -> dict[str, Any]:
         with _view(mission, console, plain=plain) as view:
@@ -126,6 +149,8 @@ def world(
     """Run the world server of a mission."""
     _follow(parent)
     mission = _load(path, seed, part="world")
+    if not as_json:
+        _show_events()
 
     async def serve() -> dict[str, Any]:
         from lalliance_agents.agent.catalog import fresh_incarnation
@@ -183,6 +208,8 @@ def robot(
         sets = load_behaviors(place) if place else []
         catalog = None if learned is None else Catalog(learned, name)
         async with await open_bus(connect) as bus:
+            if parent is None:
+                typer.echo(f"robot {name} of mission {mission.name} is connected to {connect}")
             member = Robot(
                 mission,
                 name,
@@ -201,14 +228,18 @@ def robot(
 
 @app.command()
 def check(path: MissionPath) -> None:
-    """Check a mission file; prints what it contains, or the first fault."""
+    """Check a mission file and name the first mistake in it."""
     mission = _load(path, None, part="team")
     for warning in mission.warnings():
         _warn(f"{path}: {warning}")
-    typer.echo(
-        f"{path}: mission {mission.name}, {len(mission.robots)} robots, {len(mission.tasks)} tasks, "
-        f"{sum(phase.trials for phase in mission.phases)} trials, {len(mission.faults)} faults: good"
-    )
+    parts = {
+        "robot": len(mission.robots),
+        "task": len(mission.tasks),
+        "trial": sum(phase.trials for phase in mission.phases),
+        "fault": len(mission.faults),
+    }
+    listed = ", ".join(f"{count} {what}{'' if count == 1 else 's'}" for what, count in parts.items())
+    typer.echo(f"{path} is a good mission: {mission.name}, with {listed}")
 
 
 @app.command()
@@ -250,6 +281,16 @@ def _follow(parent: int | None) -> None:
         end_with_parent(parent)
 
 
+def _show_events() -> None:
+    """Let the world server print what happens."""
+    lines = logging.StreamHandler(sys.stdout)
+    lines.setFormatter(logging.Formatter("%(message)s"))
+    events = logging.getLogger("world_server.server")
+    events.addHandler(lines)
+    events.setLevel(logging.INFO)
+    events.propagate = False
+
+
 def _warn(text: str) -> None:
     typer.echo(f"lalliance: warning: {text}", err=True)
 
@@ -273,11 +314,14 @@ def _run_until_told(work: Coroutine[Any, Any, T]) -> T:
     try:
         return asyncio.run(supervised())
     except asyncio.CancelledError:
-        raise typer.Exit(128 + (told[0] if told else signal.SIGTERM)) from None
+        number = signal.Signals(told[0] if told else signal.SIGTERM)
+        if number is signal.SIGINT:
+            typer.echo("lalliance: interrupted", err=True)
+        raise typer.Exit(128 + number) from None
 
 
 def _fail(text: str, status: int) -> NoReturn:
-    typer.echo(f"lalliance: {text}", err=True)
+    typer.echo(f"lalliance: {' '.join(text.split())}", err=True)
     sys.exit(status)
 
 
@@ -290,7 +334,12 @@ def main() -> None:
         _fail(str(error), 2)
     except LallianceError as error:
         _fail(str(error), 1)
-    except BrokenPipeError:
+    except KeyboardInterrupt:
+        _fail("interrupted", 128 + signal.SIGINT)
+    except OSError as error:
+        if error.errno not in {errno.EPIPE, errno.ENOSPC}:
+            raise
+        # Nobody reads what is printed, or it has no room: nothing more can be said there.
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)

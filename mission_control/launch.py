@@ -19,16 +19,19 @@ from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import BusError, LallianceError
-from lalliance_agents.wire.keys import Key, Keys, Kind
+from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message
 from mission_control.live import Lines
 from mission_control.processes import GRACE, Child
+from world_server.failures import Deed
 
 OPERATOR = "@operator"
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
 #: How long the world server may take to end after the last robot did, in seconds.
 LAST_CHANCE = 5.0
+#: How long the router may take to end, when nobody needs it any more, in seconds.
+ROUTER_GRACE = 0.3
 #: How often a router that dies is started again.
 ROUTER_RESTARTS = 20
 
@@ -84,7 +87,8 @@ class Launcher:
         self._plan = plan
         self._view = view
         self._clock = MissionClock(plan.speed)
-        self._endpoint = plan.connect or plan.listen or free_endpoint()
+        asked = plan.listen if plan.connect is None else plan.connect
+        self._endpoint = free_endpoint() if asked is None else asked
         self._router: Child | None = None
         self._robots: dict[str, Child] = {}
         self._lives: dict[str, int] = {}
@@ -123,21 +127,27 @@ class Launcher:
         return messenger
 
     def _take(self, _: Key, message: Message) -> None:
+        if message.sender != WORLD and message.sender not in self._plan.mission.robots:
+            return
         if isinstance(message, Event) and message.kind == "order":
             self._carry_out(message)
         self._view.take(message, self._clock.now())
 
     def _carry_out(self, order: Event) -> None:
-        """Do what the world orders, each order once."""
-        number, robot = order.details.get("number"), order.robot
-        if not isinstance(number, int) or robot not in self._plan.mission.robots or number in self._done:
+        """Do what the world orders, each order once, and nothing that the mission does not foresee."""
+        number, deed, robot = order.details.get("number"), order.details.get("deed"), order.robot
+        if not isinstance(number, int) or number in self._done or robot not in self._plan.mission.robots:
             return
-        self._done.add(number)
-        if order.details.get("deed") == "kill":
-            if robot in self._robots:
-                self._robots[robot].send_signal(signal.SIGKILL)
-        else:
-            self._spawn(self._start_robot(robot))
+        faults = [fault for fault in self._plan.mission.faults if fault.robot == robot]
+        child = self._robots.get(robot)
+        if deed == Deed.KILL and faults and child is not None:
+            self._done.add(number)
+            child.send_signal(signal.SIGKILL)
+        elif deed == Deed.START and not (child is not None and child.running):
+            returns = any(fault.restart for fault in faults)
+            if returns or self._plan.mission.robots[robot].joins > 0:
+                self._done.add(number)
+                self._spawn(self._start_robot(robot))
 
     def _spawn(self, work: Any) -> None:
         task = asyncio.create_task(work)
@@ -231,4 +241,4 @@ class Launcher:
         children = [*self._robots.values(), *([world] if world else [])]
         await asyncio.gather(*(child.end() for child in children))
         if self._router is not None:
-            await self._router.end()
+            await self._router.end(grace=ROUTER_GRACE)

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from lalliance_agents.config import Mission
 from lalliance_agents.wire.messages import Message
-from mission_control.picture import Picture
+from mission_control.picture import Picture, printable
 
 _BAR = 16
 
@@ -45,15 +45,19 @@ class Lines:
         """Show a message of the mission that came at `now`."""
         line = self._picture.take(message, now)
         if line is not None:
-            self._console.print(line, highlight=False, markup=False, soft_wrap=True)
+            self.say(line)
 
     def say(self, text: str) -> None:
         """Show a remark that is no message of the mission."""
-        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+        self._console.print(printable(text), highlight=False, markup=False, soft_wrap=True)
+
+
+#: Events shown once more when the live view is left, so that the story is not gone with it.
+RETOLD = 60
 
 
 class LiveView(Lines):
-    """A view that stays in place and is redrawn a few times a second.
+    """A view that fills the terminal and is redrawn a few times a second; when it is left, the last events stay.
 
     Args:
         mission: the mission it shows.
@@ -64,7 +68,7 @@ class LiveView(Lines):
         super().__init__(console)
         self._mission = mission
         self._name_width = max(map(len, [*mission.robots, *mission.tasks]))
-        self._live = Live(console=console, get_renderable=self._render, refresh_per_second=5, transient=True)
+        self._live = Live(console=console, get_renderable=self._render, refresh_per_second=5, screen=True)
 
     def __enter__(self) -> Self:
         self._live.__enter__()
@@ -74,6 +78,8 @@ class LiveView(Lines):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._live.__exit__(kind, error, trace)
+        for line in list(self._picture.events)[-RETOLD:]:
+            super().say(line)
 
     def take(self, message: Message, now: float) -> None:
         """Put a message into the picture; it shows at the next redraw."""
@@ -81,7 +87,7 @@ class LiveView(Lines):
 
     def say(self, text: str) -> None:
         """Show a remark among the events."""
-        self._picture.events.append(text)
+        self._picture.events.append(printable(text))
 
     def _render(self) -> RenderableType:
         height = self._console.size.height
@@ -150,5 +156,5 @@ class LiveView(Lines):
         return table
 
     def _events(self, rows: int) -> Text:
-        lines = list(self._picture.events)[-rows:]
+        lines = [printable(line) for line in list(self._picture.events)[-rows:]]
         return Text("\n".join(lines), style="dim", no_wrap=True, overflow="ellipsis")

@@ -1,5 +1,7 @@
 """Missions as the commands take them: the file checked, and the environment's own options too."""
 
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from lalliance_agents.agent.behavior import find_factory
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import BehaviorError, MissionError
 from lalliance_agents.mission_file import MissionText, load_mission_text
+from lalliance_agents.model.parameters import Parameters
 from world_server.environments import BUILT_IN, check_options, environment_class
 
 
@@ -35,7 +38,9 @@ def load(path: Path, *, for_team: bool) -> Mission:
     except MissionError as error:
         raise text.wrong(("environment", "kind"), str(error).removeprefix("environment.kind: ")) from None
     if for_team:
-        _check_behaviors(mission, text)
+        # What a user's module prints when it is imported is no output of the command.
+        with redirect_stdout(sys.stderr):
+            _check_behaviors(mission, text)
     return mission
 
 
@@ -55,7 +60,28 @@ def mission_schema() -> dict[str, Any]:
     schema["title"] = "lalliance mission"
     choice = schema["$defs"]["EnvironmentChoice"]
     choice["allOf"] = [_options_of(kind) for kind in BUILT_IN]
+    _spell_defaults(schema["$defs"]["Parameters"], Parameters().model_dump(mode="json"))
+    _close(schema)
     return schema
+
+
+def _spell_defaults(record: dict[str, Any], values: dict[str, Any]) -> None:
+    """Give the defaults as a file spells them."""
+    for name, field in record["properties"].items():
+        if "default" in field:
+            field["default"] = values[name]
+
+
+def _close(schema: Any) -> None:
+    """Where names have a pattern, say that no other names are allowed."""
+    if isinstance(schema, dict):
+        if "patternProperties" in schema:
+            schema["additionalProperties"] = False
+        for part in schema.values():
+            _close(part)
+    elif isinstance(schema, list):
+        for part in schema:
+            _close(part)
 
 
 def _options_of(kind: str) -> dict[str, Any]:

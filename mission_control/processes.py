@@ -8,6 +8,7 @@ whatever the parent died of.
 import asyncio
 import contextlib
 import ctypes
+import itertools
 import os
 import signal
 import sys
@@ -17,11 +18,21 @@ from collections.abc import Callable, Sequence
 GRACE = 1.0
 
 #: Longest line read from a child, in bytes.
-LONGEST_LINE = 2**24
+LONGEST_LINE = 2**22
 
 _PR_SET_PDEATHSIG = 1
 
+#: Lines read from a child in one turn of the event loop: a chatty child must not starve the rest.
+LINES_PER_TURN = 20
+
 OnLine = Callable[[str, str], None]
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def end_with_parent(parent: int) -> None:
@@ -85,7 +96,7 @@ class Child:
         code = self._process.returncode
         if code is None:
             return "running"
-        return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
+        return f"killed by {_signal_name(-code)}" if code < 0 else f"exit status {code}"
 
     @property
     def running(self) -> bool:
@@ -110,6 +121,7 @@ class Child:
     async def wait(self) -> int:
         """Wait for its end; its exit status."""
         code = await self._process.wait()
+        self._end_group()
         await asyncio.wait(self._readers)
         return code
 
@@ -119,19 +131,27 @@ class Child:
             with contextlib.suppress(ProcessLookupError):
                 self._process.send_signal(number)
 
-    async def end(self) -> None:
-        """Ask it to end, and kill it if it does not within the grace."""
+    async def end(self, *, grace: float = GRACE) -> None:
+        """Ask it to end, and kill it if it does not within the grace; what it has started itself ends with it."""
         self.send_signal(signal.SIGTERM)
         try:
-            async with asyncio.timeout(GRACE):
+            async with asyncio.timeout(grace):
                 await self._process.wait()
         except TimeoutError:
             self.send_signal(signal.SIGKILL)
             await self._process.wait()
-        await asyncio.wait(self._readers, timeout=GRACE)
+        self._end_group()
+        await asyncio.wait(self._readers, timeout=grace)
+
+    def _end_group(self) -> None:
+        """Kill what the child, which has ended, has left in its session."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.pid, signal.SIGKILL)
 
     async def _read(self, stream: asyncio.StreamReader) -> None:
-        while True:
+        for count in itertools.count(1):
+            if count % LINES_PER_TURN == 0:
+                await asyncio.sleep(0)
             try:
                 line = await stream.readline()
             except ValueError:  # longer than the limit; what is left of it is read next

@@ -37,9 +37,24 @@ def _tasks(tasks: Mapping[str, Any]) -> Table:
     table.add_column("attempts")
     for name, task in tasks.items():
         done = "open" if task["completed_at"] is None else f"{task['completed_at']:.1f} s"
-        attempts = ", ".join(f"{attempt['robot']} {attempt['at']:.1f} s" for attempt in task["attempts"])
+        attempts = ", ".join(map(_attempt, task["attempts"]))
         table.add_row(name, done, " + ".join(task["by"]), attempts)
     return table
+
+
+_ENDS = {
+    "lost": "lost",
+    "collision": "collided",
+    "contender": "yielded",
+    "no_success": "gave up",
+    "inapplicable": "paused",
+    "body_failed": "failed",
+}
+
+
+def _attempt(attempt: Mapping[str, Any]) -> str:
+    ended = _ENDS.get(attempt["ended"] or "")
+    return f"{attempt['robot']} from {attempt['at']:.1f} s" + (f" ({ended})" if ended else "")
 
 
 def _takeovers(takeovers: list[dict[str, Any]]) -> Table:
@@ -77,3 +92,5 @@ def _notes(summary: Mapping[str, Any]) -> Iterator[Text]:
     dropped = ", ".join(f"{count} {reason}" for reason, count in messages["dropped"].items()) or "none"
     yield Text(f"Messages: {messages['sent']} sent, {messages['received']} received, dropped: {dropped}")
     yield Text(f"Control periods: {control['periods']} kept, {control['missed']} missed")
+    if control["missed"] > 0.01 * control["periods"]:
+        yield Text("Many control periods were missed: this machine is too slow for this team at this speed", "yellow")

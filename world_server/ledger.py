@@ -10,7 +10,7 @@ import math
 from collections import Counter, deque
 from collections.abc import Iterable
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from lalliance_agents.wire.messages import DecisionMade, LinkReport
@@ -19,6 +19,8 @@ _TAKEOVERS = {"silence", "impatience", "released"}
 
 #: Attempts kept per task, and takeovers kept in all: the latest.
 MOST_KEPT = 1000
+#: Letters kept of a cause.
+MOST_LETTERS = 40
 #: Reasons of drops that are told apart; those of a robot that makes up more count as `OTHER_REASONS`.
 MOST_REASONS = 100
 OTHER_REASONS = "others"
@@ -45,8 +47,16 @@ class _Counts:
 
 
 @dataclass(slots=True)
+class _Attempt:
+    robot: str
+    at: float
+    ended: str | None = None
+    """The cause that the robot gave for its end, or `lost` if the robot was."""
+
+
+@dataclass(slots=True)
 class _TaskRecord:
-    attempts: deque[tuple[str, float]] = field(default_factory=lambda: deque(maxlen=MOST_KEPT))
+    attempts: deque[_Attempt] = field(default_factory=lambda: deque(maxlen=MOST_KEPT))
     completed_at: float | None = None
     by: tuple[str, ...] = ()
 
@@ -75,7 +85,7 @@ class Ledger:
     def began(self, robot: str, task: str, at: float) -> None:
         """`robot` began to work on `task`."""
         if task in self._tasks:
-            self._tasks[task].attempts.append((robot, at))
+            self._tasks[task].attempts.append(_Attempt(robot, at))
 
     def completed(self, task: str, by: tuple[str, ...], at: float) -> None:
         """`task` was finished by `by`."""
@@ -85,6 +95,8 @@ class Ledger:
     def failed(self, robot: str, at: float) -> None:
         """`robot` ceased to be."""
         self._failed_at[robot] = at
+        for task in self._tasks:
+            self._ended(robot, task, "lost")
 
     def returned(self, robot: str) -> None:
         """`robot` is there again."""
@@ -94,10 +106,14 @@ class Ledger:
         """A robot reported a decision; the takeover that it is, if it is one.
 
         A takeover is an activation on a task that another robot was known to have been on, and had been on indeed since
-        the one who takes it had it last.
+        the one who takes it had it last, not counting what ended at once in a collision.
         """
         record = self._tasks.get(made.task)
-        if record is None or made.verb != "activate" or made.cause not in _TAKEOVERS:
+        if record is None:
+            return None
+        if made.verb != "activate":
+            self._ended(made.sender, made.task, made.cause)
+        if made.verb != "activate" or made.cause not in _TAKEOVERS:
             return None
         if made.other is None or not _had_it_last(record.attempts, made.other, made.sender):
             return None
@@ -115,6 +131,12 @@ class Ledger:
             takeover["after_failure"] = at - self._failed_at[made.other]
         self._takeovers.append(takeover)
         return takeover
+
+    def _ended(self, robot: str, task: str, cause: str) -> None:
+        """Note how the latest attempt of `robot` at `task` ended, if it has not ended already."""
+        latest = next((one for one in reversed(self._tasks[task].attempts) if one.robot == robot), None)
+        if latest is not None and latest.ended is None:
+            latest.ended = cause[:MOST_LETTERS]
 
     def reported(self, report: LinkReport) -> None:
         """A robot's counters, which replace the ones it reported before in this incarnation."""
@@ -142,7 +164,7 @@ class Ledger:
                 task: {
                     "completed_at": record.completed_at,
                     "by": list(record.by),
-                    "attempts": [{"robot": robot, "at": at} for robot, at in record.attempts],
+                    "attempts": [asdict(attempt) for attempt in record.attempts],
                 }
                 for task, record in self._tasks.items()
             },
@@ -156,9 +178,9 @@ class Ledger:
         }
 
 
-def _had_it_last(attempts: Iterable[tuple[str, float]], other: str, sender: str) -> bool:
+def _had_it_last(attempts: Iterable[_Attempt], other: str, sender: str) -> bool:
     """Whether `other` began the task after all but the present attempt of `sender`, which is its latest."""
-    order = [robot for robot, _ in attempts]
+    order = [one.robot for one in attempts if one.ended != "collision"]
     if other not in order:
         return False
     latest_of_other = len(order) - 1 - order[::-1].index(other)

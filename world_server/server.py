@@ -16,7 +16,7 @@ from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import MessageError
 from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
-from lalliance_agents.wire.messages import Action, DecisionMade, LinkReport, Message
+from lalliance_agents.wire.messages import LONGEST_LINE, Action, DecisionMade, LinkReport, Message
 from world_server.environments.base import TaskView
 from world_server.failures import Order
 from world_server.world import Happening, World
@@ -122,14 +122,19 @@ class WorldServer:
                 self._world.ledger.reported(message)
 
     def _tell(self, happening: Happening) -> None:
-        _log.info("%.1f s %s", happening.elapsed, happening.text)
+        _log.info("%7.1f s  %s", happening.elapsed, happening.text)
         self._send_event(
             happening.kind, happening.text, happening.elapsed, robot=happening.robot, task=happening.task, details={}
         )
 
     def _send_event(self, kind: str, text: str, elapsed: float, **fields: Any) -> None:
         self._messenger.send(
-            Kind.EVENT, kind=kind, text=text, elapsed=max(elapsed, 0.0), trial=self._world.trial, **fields
+            Kind.EVENT,
+            kind=kind,
+            text=text[:LONGEST_LINE],
+            elapsed=max(elapsed, 0.0),
+            trial=self._world.trial,
+            **fields,
         )
 
     def _order(self, order: Order, now: float) -> None:

@@ -79,6 +79,10 @@ def described(one: object) -> str:
         return f"<{type(one).__name__}>"
 
 
+def _told(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
 Factory = Callable[[], Iterable[BehaviorSet]]
 
 
@@ -93,9 +97,9 @@ def find_factory(place: str) -> Factory:
         found: Any = importlib.import_module(module_name)
         for name in path.split("."):
             found = getattr(found, name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise BehaviorError(
-            f"behaviors {place!r} cannot be loaded: {type(error).__name__}: {error}; expected package.module:factory, "
+            f"behaviors {place!r} cannot be loaded: {_told(error)}; expected package.module:factory, "
             "importable from the current directory or the installed packages"
         ) from error
     if not callable(found):
@@ -115,8 +119,8 @@ def load_behaviors(place: str) -> list[BehaviorSet]:
     factory = find_factory(place)
     try:
         sets = list(factory())
-    except Exception as error:
-        raise BehaviorError(f"behaviors {place!r} failed: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise BehaviorError(f"behaviors {place!r} failed: {_told(error)}") from error
     for one in sets:
         if not isinstance(one, BehaviorSet):
             raise BehaviorError(f"behaviors {place!r} returned {described(one)}, expected instances of BehaviorSet")

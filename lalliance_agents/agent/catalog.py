@@ -47,6 +47,22 @@ class _Stored(BaseModel):
     learned: dict[str, dict[str, _StoredRecord]]
 
 
+def prepare(folder: Path) -> None:
+    """Make sure that learned times can be stored in `folder`.
+
+    Raises:
+        UserError: they cannot.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise UserError(
+            f"{folder}: learned times cannot be stored here ({_why(error)}); expected a folder that can be written to"
+        ) from error
+
+
 class Catalog:
     """What one robot has learned, on disk.
 

@@ -103,6 +103,7 @@ class Robot:
         self._trial = 0 if world else 1
         self._told: dict[str, tuple[bool, bool]] = {}
         self._broken: set[str] = set()
+        self._contradicted: set[str] = set()
         self._store_failed = False
         self._saved_version = self._version()
         self._saving: asyncio.Task[None] | None = None
@@ -238,8 +239,8 @@ class Robot:
         if self._trial == 0:
             return
         try:
-            felt = bool(one.applicable()), bool(one.complete())
-        except Exception:
+            felt = bool(one.applicable()), self._is_complete(one)
+        except (Exception, SystemExit):
             if one.task not in self._broken:
                 self._broken.add(one.task)
                 _log.exception("sensing of %s failed; taken as not applicable", described(one))
@@ -247,6 +248,14 @@ class Robot:
         if self._told.get(one.task) != felt:
             self._told[one.task] = felt
             self.mind.handle(translate.sensed(one.task, *felt), self._clock.now())
+
+    def _is_complete(self, one: BehaviorSet) -> bool:
+        """What the set says; and where there is a world, that decides when a task is done."""
+        says = bool(one.complete())
+        if one.sensed is not None and says and not one.sensed.complete and one.task not in self._contradicted:
+            self._contradicted.add(one.task)
+            _log.warning("%s says that its task is complete, and the world says that it is not", described(one))
+        return says or (one.sensed is not None and one.sensed.complete)
 
     def _body_failed(self, one: BehaviorSet) -> None:
         self.mind.handle(BodyFailed(one.task), self._clock.now())

@@ -19,7 +19,7 @@ from lalliance_agents.wire.messages import MAX_PAYLOAD
 
 #: Messages handled in one turn of the loop.
 BATCH = 256
-#: Messages that may wait; beyond it the oldest are dropped. At the largest payload this is 256 MiB.
+#: Messages that may wait; beyond it the oldest are dropped. At the largest payload this is 512 MiB.
 CAPACITY = 4096
 
 Raw = TypeVar("Raw")

@@ -28,6 +28,9 @@ _DELIVERY = {
 #: Lines about dropped messages at most: whoever makes up names cannot fill the log, nor the memory of what was logged.
 MOST_LINES = 1000
 
+#: Reasons for which messages are dropped in good order; they are counted and not logged.
+EXPECTED = {"stale", "other trial"}
+
 Receiver = Callable[[Key, Message], None]
 
 
@@ -119,7 +122,7 @@ class Messenger:
     def drop(self, reason: str, source: str, detail: str = "") -> None:
         """Count a message that is not used, and log the first of its source and reason."""
         self.dropped[reason] += 1
-        if reason != "stale" and self._is_first(reason, source):
+        if reason not in EXPECTED and self._is_first(reason, source):
             _log.warning("dropping messages of %s: %s", source, detail or reason)
 
     def _is_first(self, reason: str, source: str) -> bool:

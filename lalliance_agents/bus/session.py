@@ -7,6 +7,7 @@ error texts name paths of the machine it was built on and are never shown. Nothi
 """
 
 import asyncio
+import atexit
 import contextlib
 import json
 import re
@@ -72,6 +73,17 @@ def check_endpoint(endpoint: str) -> None:
         )
 
 
+#: Threads that are opening or closing a session, as far as they have not been forgotten.
+_threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+
+
+@atexit.register
+def _let_threads_end() -> None:
+    """Wait a little for what still goes on in Zenoh: a thread that returns into an ending interpreter aborts the process."""
+    for thread in list(_threads):
+        thread.join(CLOSE_LIMIT)
+
+
 async def open_session(settings: dict[str, Any]) -> zenoh.Session:
     """Open a session without blocking the loop; cancelled, it is closed again as soon as it is open.
 
@@ -98,7 +110,9 @@ async def in_thread(work: Callable[[], T], *, unwanted: Callable[[T], object] | 
         if unwanted is not None and finished.exception() is None:
             unwanted(finished.result())
 
-    threading.Thread(target=run, name="zenoh-session", daemon=True).start()
+    thread = threading.Thread(target=run, name="zenoh-session", daemon=True)
+    _threads.add(thread)
+    thread.start()
     try:
         return await asyncio.shield(asyncio.wrap_future(done))
     except asyncio.CancelledError:

@@ -51,7 +51,9 @@ class Reading(StrEnum):
 
 
 class Erratum(StrEnum):
-    """Places where the literal Appendix breaks. Comments: literal text -> mended reading."""
+    """Places where the Appendix, taken literally, does not work; each can be read literally or mended."""
+
+    # Below, for each place: the literal text -> the mended reading.
 
     #: 1. The learned influence also gates the active set -> only inactive sets.
     INFLUENCE_ON_ACTIVE = "influence_on_active"

@@ -17,8 +17,8 @@ from lalliance_agents.wire.keys import NAME_PATTERN, SENDER_PATTERN, Key, Kind
 
 VERSION: Literal[1] = 1
 
-#: Larger messages are dropped unread, in bytes: room for the status of a mission with some thousand tasks.
-MAX_PAYLOAD = 256 * 1024
+#: Larger messages are dropped unread, in bytes: room for the status of a mission with a thousand tasks.
+MAX_PAYLOAD = 128 * 1024
 
 #: With more faults than this the first is not looked up: pydantic would spell out all of them.
 _MOST_FAULTS = 20
@@ -29,6 +29,10 @@ Count = Annotated[int, Field(ge=0, lt=2**63)]
 #: The longest time that can be said, in seconds.
 LONGEST = 1e12
 Seconds = Annotated[float, Field(ge=0, le=LONGEST)]
+Word = Annotated[str, Field(max_length=40)]
+#: Letters that a line of text may have.
+LONGEST_LINE = 500
+Line = Annotated[str, Field(max_length=LONGEST_LINE)]
 Scalars = dict[str, str | int | float | bool | None]
 
 
@@ -100,9 +104,9 @@ class BodyState(Message):
 class DecisionMade(Message):
     """One decision with everything behind it; see `lalliance_agents.model.events.Decision`."""
 
-    verb: str
+    verb: Word
     task: Name
-    cause: str
+    cause: Word
     other: Name | None
     active_for: Seconds
     trial: Count
@@ -144,13 +148,13 @@ class LinkReport(Message):
 class Event(Message):
     """Something happened in the world."""
 
-    kind: str
+    kind: Word
     robot: Name | None = None
     task: Name | None = None
     elapsed: Seconds
     """Time since the trial began, in seconds."""
     trial: Count
-    text: str
+    text: Line
     details: Scalars = {}
 
 

@@ -155,11 +155,14 @@ def test_what_is_good_is_called_good(processes: Processes) -> None:
     (processes.folder / "good.yaml").write_text(GOOD)
     done = processes.run("check", "good.yaml")
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == "good.yaml: mission good, 2 robots, 2 tasks, 1 trials, 0 faults: good\n"
+    assert done.stdout == "good.yaml is a good mission: good, with 2 robots, 2 tasks, 1 trial, 0 faults\n"
 
 
 def test_the_schema_is_json_and_knows_the_options_of_environments(processes: Processes) -> None:
     schema = json.loads(processes.run("schema").stdout)
     assert schema["properties"].keys() >= {"name", "tasks", "robots", "parameters", "phases", "faults"}
+    assert schema["$defs"]["Parameters"]["properties"]["strategy"]["default"] == "II"
+    assert schema["$defs"]["Parameters"]["properties"]["ordering"]["default"] == "derived"
+    assert schema["properties"]["tasks"]["additionalProperties"] is False
     kinds = [one["if"]["properties"]["kind"]["const"] for one in schema["$defs"]["EnvironmentChoice"]["allOf"]]
     assert kinds == ["task_pool", "box_pushing"]

@@ -119,4 +119,16 @@ def test_what_is_kept_is_limited_however_much_is_said(monkeypatch: pytest.Monkey
     assert sum(summary["messages"]["dropped"].values()) == 3 * module.MOST_KEPT
     assert len(summary["messages"]["dropped"]) == module.MOST_REASONS + 1
     assert len(summary["tasks"]["a"]["attempts"]) == len(summary["takeovers"]) == module.MOST_KEPT
-    assert summary["tasks"]["a"]["attempts"][-1] == {"robot": "right", "at": 3 * module.MOST_KEPT - 1.0}
+    assert summary["tasks"]["a"]["attempts"][-1] == {"robot": "right", "at": 3 * module.MOST_KEPT - 1.0, "ended": None}
+
+
+def test_an_attempt_that_ended_in_a_collision_is_nothing_to_take_over() -> None:
+    ledger = Ledger(["a"])
+    ledger.began("left", "a", 1.0)
+    ledger.began("right", "a", 1.0)
+    collided = activation("right", "left", "collision").model_copy(update={"verb": "yield"})
+    assert ledger.decided(collided, 1.1) is None
+    ledger.began("left", "a", 9.0)
+    assert ledger.decided(activation("left", "right", "silence"), 9.0) is None
+    ledger.failed("left", 12.0)
+    assert [attempt["ended"] for attempt in ledger.summary()["tasks"]["a"]["attempts"]] == [None, "collision", "lost"]
