@@ -1,6 +1,7 @@
 """Bad input gets one sentence, exit status 2, and nothing is started."""
 
 import json
+import os
 import socket
 import time
 from collections.abc import Iterator
@@ -103,6 +104,11 @@ COMMANDS = {
         ["robot", "good.yaml", "--name", "one", "--behaviors", "no_such_module:make"],
         "behaviors 'no_such_module:make' cannot be loaded: ModuleNotFoundError",
     ),
+    "learned times where there is no folder": (
+        ["run", "good.yaml", "--learned", "good.yaml"],
+        "good.yaml: learned times cannot be stored here (File exists); expected a folder that can be written to",
+    ),
+    "an empty endpoint": (["run", "good.yaml", "--connect", ""], "'' is not an endpoint"),
     "an endpoint that is none": (["router", "--listen", "nonsense"], "'nonsense' is not an endpoint"),
     "a router to use and one to start": (
         ["run", "good.yaml", "--connect", "tcp/127.0.0.1:1", "--listen", "tcp/127.0.0.1:2"],
@@ -120,6 +126,27 @@ def test_a_bad_command_is_refused(processes: Processes, case: str) -> None:
     assert done.stdout == ""
     assert done.stderr.startswith(f"lalliance: {sentence}")
     assert done.stderr.count("\n") == 1
+
+
+def test_a_module_that_ends_the_process_is_no_behaviour(processes: Processes) -> None:
+    (processes.folder / "leaver.py").write_text("import sys\nsys.exit(0)\n")
+    (processes.folder / "m.yaml").write_text(changed("two: {", "two: {behaviors: 'leaver:make', "))
+    done = processes.run("check", "m.yaml")
+    assert done.returncode == 2
+    assert "behaviors 'leaver:make' cannot be loaded: SystemExit: 0" in done.stderr
+
+
+def test_what_a_module_prints_is_no_part_of_the_document(processes: Processes) -> None:
+    (processes.folder / "talker.py").write_text("print('hello')\ndef make():\n    print('made')\n    return []\n")
+    (processes.folder / "m.yaml").write_text(changed("two: {", "two: {behaviors: 'talker:make', "))
+    assert processes.run_json("run", "m.yaml", "--speed", "4")["complete"]
+
+
+def test_a_pipe_is_no_mission(processes: Processes) -> None:
+    os.mkfifo(processes.folder / "pipe")
+    done = processes.run("check", "pipe")
+    assert done.returncode == 2
+    assert done.stderr == "lalliance: pipe: not a regular file; expected a mission file\n"
 
 
 @pytest.mark.parametrize("arguments", [["router", "--listen"], ["run", "good.yaml", "--listen"]])

@@ -102,6 +102,43 @@ def test_a_mission_without_robots_left_ends_before_its_deadline(processes: Proce
     assert processes.alive() == []
 
 
+CHATTY = """
+import subprocess
+from lalliance_agents import BehaviorSet
+
+class Chatty(BehaviorSet):
+    task = "a"
+
+    async def perform(self):
+        subprocess.Popen(["sleep", "1000"])
+        print("working\\n" * 300_000)
+        await super().perform()
+
+def make():
+    return [Chatty()]
+"""
+
+
+def test_a_robots_own_code_can_neither_hold_the_launcher_nor_leave_a_process(processes: Processes, small: Path) -> None:
+    (processes.folder / "chatty.py").write_text(CHATTY)
+    small.write_text(SMALL.replace("left: {", "left: {behaviors: 'chatty:make', "))
+    run = processes.start("run", small, "--plain")
+    read_until(run, "[left] working")
+    run.send_signal(signal.SIGINT)
+    run.communicate(timeout=4.0)
+    assert run.returncode == 130
+    assert processes.alive() == []
+
+
+def test_a_death_by_a_signal_without_a_name_is_told_too(processes: Processes, small: Path) -> None:
+    run = processes.start("run", small, "--speed", "2", "--plain")
+    read_until(run, "right starts")
+    os.kill(processes.alive("world")[0], signal.SIGRTMIN + 1)
+    _, err = run.communicate(timeout=20)
+    assert run.returncode == 1
+    assert "the world server ended without a summary (killed by signal 35)" in err
+
+
 def test_a_world_server_that_dies_ends_the_run_with_a_sentence(processes: Processes, small: Path) -> None:
     run = processes.start("run", small, "--speed", "2", "--plain")
     read_until(run, "right starts")
