@@ -14,7 +14,7 @@ from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.bus.patterns import matches
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
-from lalliance_agents.errors import MessageError
+from lalliance_agents.errors import MessageError, UserError
 from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import LONGEST_LINE, Action, DecisionMade, LinkReport, Message
 from world_server.environments.base import TaskView
@@ -27,6 +27,8 @@ _log = logging.getLogger(__name__)
 STEP = 0.05
 LEAST_STEP = 0.01
 REFRESH_PERIOD = 1.0
+#: How long to listen at the start for another world server of the mission, in real seconds.
+RIVAL_TIMEOUT = 0.5
 STATUS_PERIOD = 0.25
 #: How long the world stays at the end for the robots' last reports, in real seconds.
 LINGER = 2.0
@@ -60,7 +62,11 @@ class WorldServer:
         self._ordered: dict[int, float] = {}
 
     async def run(self) -> dict[str, Any]:
-        """Serve until the mission is over; its summary."""
+        """Serve until the mission is over; its summary.
+
+        Raises:
+            UserError: another world server serves this mission.
+        """
         watching: Registration | None = None
         try:
             await self._open()
@@ -82,6 +88,10 @@ class WorldServer:
 
     async def _open(self) -> None:
         keys, messenger = self._keys, self._messenger
+        if await self._bus.query(keys.build(Kind.SENSE_TASK), timeout=RIVAL_TIMEOUT):
+            raise UserError(
+                f"another world server serves mission {self._mission.name} on this bus already; expected to be the only one"
+            )
         await messenger.offer(keys.build(Kind.SENSE_TASK), self._answer_tasks)
         await messenger.offer(keys.build(Kind.SENSE_ROBOT), self._answer_bodies)
         for kind in (Kind.ACTION, Kind.DECISION, Kind.LINK):

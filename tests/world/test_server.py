@@ -11,6 +11,7 @@ import pytest
 from lalliance_agents.bus.base import Delivery
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.errors import UserError
 from lalliance_agents.mission_file import parse_mission
 from lalliance_agents.wire.keys import Key, Keys, Kind
 from lalliance_agents.wire.messages import BodyState, Event, Message, Status, TaskState
@@ -194,3 +195,12 @@ async def test_two_robots_that_join_late_are_both_ordered() -> None:
                     await served.appear(m.robot)
         assert sorted(carried_out.values()) == ["start c", "start d"]
         assert {"c is there", "d is there"} <= set(served.events())
+
+
+async def test_a_second_world_server_of_a_mission_is_refused_and_the_first_goes_on() -> None:
+    async with Served() as served:
+        await served.appear("left", "right")
+        async with MemoryBus(served.hub) as bus:
+            with pytest.raises(UserError, match="another world server serves mission pair on this bus already"):
+                await WorldServer(served.mission, bus=bus, incarnation=2).run()
+        assert not served.task.done()
