@@ -77,12 +77,7 @@ class Catalog:
     def __init__(self, folder: Path, robot: str) -> None:
         self.path = folder / f"{robot}.json"
         self._robot = robot
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UserError(
-                f"{folder}: learned times cannot be stored here ({_why(error)}); expected a folder"
-            ) from error
+        prepare(folder)
         text = self._read()
         try:
             stored = None if text is None else self._check(text)

@@ -215,18 +215,14 @@ class Mind:
         assert factors is not None  # noqa: S101 - set by `tick` just before
         rival = self._appraisal.rival(one, self.me, now) if self._collisions else None
         contender = next((mate.robot for mate in self._contenders(one, now)), None)
+        # Acquiescence with no limit to an attempt is 0 only because of the contender.
+        yields = equations.acquiescence(one.active_for(now), factors.psi, contender is not None, math.inf) == 0
         reasons: list[tuple[bool, Cause, str | None]] = [
             (one.complete, Cause.SENSED, None),
             (factors.sensory_feedback == 0, Cause.INAPPLICABLE, None),
             (one.body_failed, Cause.BODY_FAILED, None),
             (rival is not None, Cause.COLLISION, rival),
-            (
-                factors.acquiescence == 0
-                and contender is not None
-                and equations.more_than(one.active_for(now), factors.psi),
-                Cause.CONTENDER,
-                contender,
-            ),
+            (yields, Cause.CONTENDER, contender),
             (factors.acquiescence == 0, Cause.NO_SUCCESS, None),
             (factors.impatience_reset == 0, Cause.RESET, contender),
             (factors.learned_robot_influence == 0, Cause.NOT_BEST, None),
