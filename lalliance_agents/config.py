@@ -17,6 +17,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import ConfigDict, Field, GetPydanticSchema, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError, core_schema, to_json
 
+from lalliance_agents.fault_checks import contradiction, misfit
+from lalliance_agents.faults import AnyFault, Crash, Fault, Hang, robot_of
 from lalliance_agents.model.parameters import Architecture, Learning, NotNegative, Parameters, Positive, Record
 from lalliance_agents.wire.keys import NAME_PATTERN
 
@@ -102,36 +104,6 @@ class Phase(Record):
         return self
 
 
-class CrashFault(Record):
-    """A robot's process is killed (SIGKILL) during the live trial."""
-
-    kind: Literal["crash"]
-    """`crash`."""
-    robot: Name
-    """Whose process."""
-    at: NotNegative
-    """When, in seconds after the live trial's start."""
-    restart: bool = False
-    """Whether the process is started again, with a new incarnation and the learned times it had stored."""
-    until: Positive | None = None
-    """When it is started again; default: 5 seconds after `at`."""
-
-    @property
-    def restart_at(self) -> float | None:
-        """When the process is started again, in seconds after the live trial's start; None: never."""
-        if not self.restart:
-            return None
-        return self.at + 5.0 if self.until is None else self.until
-
-    @model_validator(mode="after")
-    def _check_until(self) -> Self:
-        if self.until is not None and not self.restart:
-            raise ValueError(f"until {self.until:g} needs restart: true, a crashed robot does not return by itself")
-        if self.until is not None and self.until <= self.at:
-            raise ValueError(f"until {self.until:g} s must come after at {self.at:g} s")
-        return self
-
-
 class Mission(Record):
     """Everything a mission file says."""
 
@@ -147,7 +119,7 @@ class Mission(Record):
     """Parameters of every robot."""
     phases: Annotated[tuple[Phase, ...], Field(min_length=1)] = (Phase(),)
     """Trials, one phase after the other; the last trial of all is the live one: its time is the makespan."""
-    faults: tuple[CrashFault, ...] = ()
+    faults: tuple[AnyFault, ...] = ()
     """Faults of the live trial."""
     knowledge: Literal["none", "given"] = "none"
     """What robots know before the first trial: nothing, or the true times of all who share their tasks."""
@@ -244,28 +216,24 @@ class Mission(Record):
 
     def _check_faults(self) -> None:
         for index, fault in enumerate(self.faults):
-            if fault.robot not in self.robots:
-                raise misplaced(
-                    ("faults", index, "robot"),
-                    f"{fault.robot!r} is not a robot of this mission{like(fault.robot, self.robots)}",
-                )
+            wrong = self.misfit(fault)
+            if wrong is not None:
+                raise misplaced(("faults", index, *wrong[0]), wrong[1])
             self._check_before_deadline(fault.at, ("faults", index, "at"))
             self._check_before_deadline(fault.until or 0.0, ("faults", index, "until"))
-        down = dict.fromkeys(self.robots, -inf)
-        for index, fault in sorted(enumerate(self.faults), key=lambda numbered: numbered[1].at):
-            joins = self.robots[fault.robot].joins
-            if fault.at < joins:
-                raise misplaced(
-                    ("faults", index, "at"),
-                    f"at {fault.at:g} s robot {fault.robot} is not there; expected not before it joins, {joins:g} s",
-                )
-            if fault.at <= down[fault.robot]:
-                raise misplaced(
-                    ("faults", index, "at"),
-                    f"at {fault.at:g} s robot {fault.robot} is down from an earlier fault; expected "
-                    + ("no further fault of it" if down[fault.robot] == inf else f"more than {down[fault.robot]:g} s"),
-                )
-            down[fault.robot] = inf if fault.restart_at is None else fault.restart_at
+        for index, fault in enumerate(self.faults):
+            for number, earlier in enumerate(self.faults[:index]):
+                against = contradiction(fault, earlier, self.robots)
+                if against is not None:
+                    raise misplaced(("faults", index), f"{against} (see faults.{number})")
+
+    def misfit(self, fault: Fault) -> tuple[tuple[str | int, ...], str] | None:
+        """What of a fault does not fit this mission, and where in the fault; None if it fits."""
+        wrong = misfit(fault, self.robots, lambda robot: self.robots[robot].tasks, like)
+        robot = robot_of(fault)
+        if wrong is None and robot is not None and fault.at < (joins := self.robots[robot].joins):
+            return ("at",), f"at {fault.at:g} s robot {robot} is not there; expected not before it joins, {joins:g} s"
+        return wrong
 
     def _check_live_trial(self) -> None:
         planned = self.faults or any(robot.joins > 0 for robot in self.robots.values())
@@ -326,15 +294,15 @@ class Mission(Record):
                     f"tasks.{task}: its fastest robot needs {fastest:g} s, longer than the deadline of {self.deadline:g} s"
                 )
         for index, fault in enumerate(self.faults):
-            if self._last_able(fault):
+            if only := self._last_able(fault):
                 found.append(
-                    f"faults.{index}: {fault.robot} is the only robot for {', '.join(self._last_able(fault))}; "
+                    f"faults.{index}: {robot_of(fault)} is the only robot for {', '.join(only)}; "
                     "the mission cannot complete if that is still open"
                 )
         return found
 
-    def _last_able(self, fault: CrashFault) -> list[str]:
-        if fault.restart:
+    def _last_able(self, fault: Fault) -> list[str]:
+        if not isinstance(fault, Crash | Hang) or fault.end < inf:
             return []
         return [task for task in self.robots[fault.robot].tasks if self.able(task) == [fault.robot]]
 

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from lalliance_agents.config import ENVIRONMENT_PATTERN, FACTORY_PATTERN, like
+from lalliance_agents.faults import GLOB_PATTERN
 from lalliance_agents.model.parameters import Parameters
 from lalliance_agents.wire.keys import NAME_PATTERN
 
@@ -24,6 +25,7 @@ Place = tuple[str | int, ...]
 _KINDS = {bool: "a truth value", int: "a number", float: "a number", str: "text", list: "a list", dict: "a mapping"}
 _PATTERNS = {
     NAME_PATTERN: ("is not a name", "1 to 64 of A-Z a-z 0-9 _ -"),
+    GLOB_PATTERN: ("is no name and no glob", "1 to 64 of A-Z a-z 0-9 _ - * ?"),
     FACTORY_PATTERN: ("is not allowed", "package.module:factory"),
     ENVIRONMENT_PATTERN: ("is not allowed", "the name of an environment or package.module:Class"),
 }
@@ -163,8 +165,8 @@ def _likeliest(alternatives: dict[Place, list[_Told]]) -> list[_Told]:
     """Of the alternatives of a union the one that fits best: its errors lie deepest. Where no kind fits, all in one."""
     firsts = [told[0] for told in alternatives.values()]
     if all(told.place == firsts[0].place and told.depth == len(told.place) and not told.meant for told in firsts):
-        wanted = dict.fromkeys(told.hint.removeprefix("expected ") for told in firsts)
-        return [firsts[0]._replace(hint=f"expected {' or '.join(wanted)}")]
+        wanted = dict.fromkeys(told.hint.removeprefix("expected ") for told in firsts if told.hint)
+        return [firsts[0]._replace(hint=f"expected {' or '.join(wanted)}" if wanted else "")]
     return max(alternatives.values(), key=lambda told: (max(one.depth for one in told), -len(told)))
 
 

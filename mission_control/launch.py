@@ -19,13 +19,12 @@ from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import BusError, LallianceError
-from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
+from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message
 from mission_control.live import Lines
 from mission_control.processes import GRACE, Child
 from world_server.failures import Deed
 
-OPERATOR = "@operator"
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
 #: How long the world server may take to end after the last robot did, in seconds.
@@ -121,7 +120,7 @@ class Launcher:
 
     async def _watch(self, bus: Bus) -> Messenger:
         keys = Keys(self._plan.mission.name)
-        messenger = Messenger(bus, keys, OPERATOR, 1, self._clock.now)
+        messenger = Messenger(bus, keys, LAUNCHER, 1, self._clock.now)
         for kind in (Kind.EVENT, Kind.STATUS, Kind.DECISION, Kind.MOTIVATION):
             await messenger.listen(keys.build(kind), self._take)
         return messenger

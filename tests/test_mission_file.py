@@ -222,17 +222,49 @@ ADDED = {
     "faults: [{kind: crash, robot: r1}]": "faults.0: a field is missing; expected a field 'at'",
     "faults: [{kind: crash, robot: rr2, at: 3}]": "faults.0.robot: 'rr2' is not a robot of this mission; "
     "did you mean 'r2'?",
-    "faults: [{kind: crsh, robot: r1, at: 1}]": "faults.0.kind: 'crsh' is not allowed; expected crash; "
-    "did you mean 'crash'?",
+    "faults: [{kind: crsh, robot: r1, at: 1}]": "faults.0.kind: 'crsh' is not allowed; expected one of crash, "
+    "hang, stuck, slow, mute, deaf, blind; did you mean 'crash'?",
     "faults: [{kind: crash, robot: r1, at: 600}]": "faults.0.at: 600 s is not before the mission's deadline; "
     "expected less than 600 s",
     "faults: [{kind: crash, robot: r1, at: 1, restart: 'yes'}]": "faults.0.restart: 'yes' is text; "
     "expected true or false",
     "faults: [{kind: crash, robot: r1, at: 1, until: 1, restart: yes}]": "faults.0: until 1 s must come after at 1 s",
-    "faults: [{kind: crash, robot: r1, at: 3}, {kind: crash, robot: r1, at: 1}]": "faults.0.at: at 3 s robot r1 is "
-    "down from an earlier fault; expected no further fault of it",
-    "faults: [{kind: crash, robot: r1, at: 3, restart: on}, {kind: crash, robot: r1, at: 8}]": "faults.1.at: at 8 s "
-    "robot r1 is down from an earlier fault; expected more than 8 s",
+    "faults: [{kind: crash, robot: r1, at: 3}, {kind: crash, robot: r1, at: 1}]": "faults.1: at 3 s robot r1 is "
+    "down from an earlier crash; expected no further fault of it (see faults.0)",
+    "faults: [{kind: crash, robot: r1, at: 3, restart: on}, {kind: crash, robot: r1, at: 8}]": "faults.1: at 8 s "
+    "robot r1 is down from an earlier crash; expected more than 8 s (see faults.0)",
+    "faults: [{kind: hang, robot: r1, at: 3}, {kind: crash, robot: r1, at: 8}]": "faults.1: at 8 s robot r1 is down from "
+    "an earlier hang; expected no further fault of it (see faults.0)",
+    "faults: [{kind: crash, robot: r1, at: 3}, {kind: mute, robot: r1, at: 8}]": "faults.1: robot r1 is down from 3 s on; "
+    "expected a time at which it is there (see faults.0)",
+    "faults: [{kind: mute, robot: r1, at: 3}, {kind: mute, robot: r1, at: 8}]": "faults.1: robot r1 is mute already at that "
+    "time; expected one fault of a kind at a time (see faults.0)",
+    "faults: [{kind: crash, robot: r1, at: 3, until: 9}]": "faults.0: until 9 needs restart: true, a crashed robot does not "
+    "return by itself",
+    "faults: [{kind: slow, robot: r1, at: 3, factor: 0.5}]": "faults.0.factor: 0.5 is not allowed; expected a number greater "
+    "than 1",
+    "faults: [{kind: slow, robot: r1, at: 3}]": "faults.0: a field is missing; expected a field 'factor'",
+    "faults: [{kind: stuck, robot: r2, at: 3, task: a}]": "faults.0.task: 'a' is not a task of robot r2",
+    "faults: [{robot: r1, at: 3}]": "faults.0: a field is missing; expected a field 'kind'",
+    "faults: [{at: -3, link: {}, loss: 0.5}]": "faults.0.at: -3 is not allowed; expected a number of at least 0",
+    "faults: [{at: 3, link: {}, loss: 1.5}]": "faults.0.loss: 1.5 is not allowed; expected a number of at most 1",
+    "faults: [{at: 3, link: {}, loss: {enter: 0.1}}]": "faults.0.loss: a field is missing; expected a field 'leave'",
+    "faults: [{at: 3, link: {}, los: 0.5}]": "faults.0.los: unknown field; did you mean 'loss'?",
+    "faults: [{at: 3, link: {form: r1}, loss: 0.5}]": "faults.0.link.form: unknown field; did you mean 'from'?",
+    "faults: [{at: 3, link: {from: r1}}]": "faults.0: the rule does nothing; expected loss, delay, duplicate, reorder or "
+    "cut: true",
+    "faults: [{at: 3, link: {from: r3}, loss: 0.5}]": "faults.0.link.from: 'r3' matches no robot of this mission",
+    "faults: [{at: 3, link: {from: r/2}, loss: 0.5}]": "faults.0.link.from: 'r/2' is no name and no glob; expected 1 to 64 "
+    "of A-Z a-z 0-9 _ - * ?",
+    "faults: [{at: 3, link: {}, delay: {uniform: [2, 1]}}]": "faults.0.delay.uniform: the second number 1 s is below the "
+    "first one 2 s",
+    "faults: [{at: 3, link: {}, delay: {unifrm: [1, 2]}}]": "faults.0.delay.unifrm: unknown field; did you mean 'uniform'?",
+    "faults: [{at: 3, link: {}, loss: 0.5}, {at: 5, link: {to: r2}, loss: 0.3}]": "faults.1: another rule sets loss from r1 "
+    "to r2 otherwise at the same time; expected one value (see faults.0)",
+    "faults: [{at: 3, partition: [r1]}]": "faults.0.partition: ['r1'] is not allowed; expected 2 or more entries",
+    "faults: [{at: 3, partition: [r1, [r2, 'r*']]}]": "faults.0.partition.1: r1 is in two groups of the partition; expected "
+    "it in one",
+    "faults: [5]": "faults.0: 5 is a number; expected a mapping",
     "deadline: 0": "deadline: 0 is not allowed; expected a number greater than 0",
     "seed: 1.0": "seed: 1.0 is not allowed; expected a whole number",
     "seed: -1": "seed: -1 is not allowed; expected a number of at least 0",

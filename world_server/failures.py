@@ -1,15 +1,23 @@
-"""The mission's fault schedule, and whether each fault really happened.
+"""The faults of the live trial: those that the mission schedules and those that are injected, and whether each really happened.
 
-A crash is made outside of this process: the schedule orders it, and it counts as fired only when the robot's presence was
-seen to end after that. An order stands until it has been confirmed, so whoever carries it out may miss it a few times, and
-must not carry it out twice: its number tells.
+A fault waits for its time, is in force, and is over. What it does is made in four places. The body: `pace` says how fast a
+robot's body works. The links: `rules` and `blind` go to every bus, and the buses report what they did. The process: orders go
+to whoever holds the robots' processes; an order stands until it has been confirmed, so whoever carries it out may miss it a
+few times, and must not carry it out twice: its number tells. A fault has fired only when its effect was seen: the process gone
+or reported as stopped, a message touched, a working body held up.
 """
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from lalliance_agents.config import CrashFault, Mission
+from lalliance_agents.config import Mission
+from lalliance_agents.errors import UserError
+from lalliance_agents.fault_checks import contradiction
+from lalliance_agents.faults import Blind, Crash, Fault, Hang, Slow, Stuck, describe, kind_of, robot_of
+from lalliance_agents.wire.messages import Blindness, Effect, LinkRule
+from world_server.rules import link_rules
 
 
 class Deed(StrEnum):
@@ -17,6 +25,8 @@ class Deed(StrEnum):
 
     KILL = "kill"
     START = "start"
+    HANG = "hang"
+    RESUME = "resume"
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,66 +39,238 @@ class Order:
     because: str
 
 
+class State(StrEnum):
+    """How far a fault is."""
+
+    WAITING = "waiting"
+    ON = "on"
+    OVER = "over"
+
+
 @dataclass(slots=True)
-class _Crash:
-    fault: CrashFault
-    ordered: bool = False
+class Entry:
+    """One fault and what became of it."""
+
+    name: str
+    fault: Fault
+    begins: float
+    ends: float
+    state: State = State.WAITING
+    count: int = 0
     fired_at: float | None = None
-    returned: bool = False
+    order: Order | None = None
+    """What is yet to be confirmed."""
+
+    def fire(self, elapsed: float, count: int = 1) -> None:
+        """Its effect was seen, `count` times more."""
+        self.count += count
+        if self.fired_at is None:
+            self.fired_at = elapsed
+
+    def report(self) -> dict[str, Any]:
+        """The fault as plain data."""
+        return {
+            "name": self.name,
+            "kind": kind_of(self.fault),
+            "robot": robot_of(self.fault),
+            "text": describe(self.fault),
+            "at": self.begins,
+            "until": None if self.ends == math.inf else self.ends,
+            "state": self.state.value,
+            "fired": self.fired_at is not None,
+            "fired_at": self.fired_at,
+            "count": self.count,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A fault began or ended."""
+
+    entry: Entry
+    on: bool
 
 
 class Failures:
-    """Faults of the live trial, and the robots that join it late.
+    """Faults of the live trial, and the robots that join it late. Instants are seconds since that trial began.
 
     Args:
         mission: whose faults.
     """
 
     def __init__(self, mission: Mission) -> None:
-        self._crashes = [_Crash(fault) for fault in mission.faults]
-        joining = [(name, spec.joins) for name, spec in mission.robots.items() if spec.joins > 0]
+        self._mission = mission
+        self.entries: list[Entry] = []
+        self._numbers = 0
+        self._joins = {name: spec.joins for name, spec in mission.robots.items() if spec.joins > 0}
         self._joining = {
-            name: Order(number, Deed.START, name, f"joins at {joins:g} s")
-            for number, (name, joins) in enumerate(joining, 2 * len(self._crashes))
+            name: self._order(Deed.START, name, f"joins at {joins:g} s") for name, joins in self._joins.items()
         }
-        self._joins = dict(joining)
+        for fault in mission.faults:
+            self._add(fault, fault.at, fault.end)
+
+    def _add(self, fault: Fault, begins: float, ends: float) -> Entry:
+        entry = Entry(f"{len(self.entries) + 1}-{kind_of(fault)}", fault, begins, ends)
+        self.entries.append(entry)
+        return entry
+
+    def _order(self, deed: Deed, robot: str, because: str) -> Order:
+        self._numbers += 1
+        return Order(self._numbers, deed, robot, because)
+
+    def next_instant(self, elapsed: float) -> float:
+        """The next instant after `elapsed` at which a fault begins or ends; infinite if none does."""
+        due = [entry.begins for entry in self.entries if entry.state is State.WAITING]
+        due += [entry.ends for entry in self.entries if entry.state is State.ON]
+        return min([*due, *(self._joins[robot] for robot in self._joining)], default=math.inf)
+
+    def advance(self, elapsed: float) -> list[Change]:
+        """Let faults begin and end that are due at `elapsed`; what changed."""
+        changes = []
+        for entry in self.entries:
+            if entry.state is State.WAITING and entry.begins <= elapsed:
+                changes.append(self._begin(entry))
+            if entry.state is State.ON and entry.ends <= elapsed:
+                changes.append(self._end(entry))
+        return changes
+
+    def _begin(self, entry: Entry) -> Change:
+        entry.state = State.ON
+        deed = {Crash: Deed.KILL, Hang: Deed.HANG}.get(type(entry.fault))
+        if deed is not None:
+            entry.order = self._order(
+                deed, robot_of(entry.fault) or "", f"{kind_of(entry.fault)} at {entry.begins:g} s"
+            )
+        return Change(entry, on=True)
+
+    def _end(self, entry: Entry) -> Change:
+        entry.state = State.OVER
+        robot = robot_of(entry.fault) or ""
+        if isinstance(entry.fault, Crash):
+            entry.order = self._order(Deed.START, robot, f"restart at {entry.ends:g} s")
+        elif isinstance(entry.fault, Hang):
+            entry.order = self._order(Deed.RESUME, robot, f"hang until {entry.ends:g} s")
+        return Change(entry, on=False)
+
+    def inject(self, fault: Fault, elapsed: float, lasts: float | None) -> tuple[Entry, list[Change]]:
+        """Put a fault in force now.
+
+        Args:
+            fault: the fault; its own times are not looked at but for the length between them.
+            elapsed: the present instant, in seconds.
+            lasts: how long, in seconds; None: as long as the fault itself says.
+
+        Raises:
+            UserError: the fault does not fit the team or contradicts another one.
+        """
+        length = fault.end - fault.at if lasts is None else lasts
+        ends = elapsed + length
+        timed = fault.model_copy(update={"at": elapsed, "until": None if ends == math.inf else ends})
+        wrong = self._mission.misfit(timed)
+        if wrong is not None:
+            raise UserError(f"{'.'.join(map(str, wrong[0]))}: {wrong[1]}")
+        for entry in self.entries:
+            if entry.state is not State.OVER:
+                earlier = entry.fault.model_copy(
+                    update={"at": entry.begins, "until": None if entry.ends == math.inf else entry.ends}
+                )
+                against = contradiction(timed, earlier, self._mission.robots)
+                if against is not None:
+                    raise UserError(f"{against} (see fault {entry.name})")
+        entry = self._add(timed, elapsed, ends)
+        return entry, self.advance(elapsed)
+
+    def heal(self, name: str, elapsed: float) -> list[Change]:
+        """End the fault `name`, or all that are in force if it is empty.
+
+        Raises:
+            UserError: there is no such fault in force.
+        """
+        on = [entry for entry in self.entries if entry.state is State.ON and name in {"", entry.name}]
+        if name and not on:
+            known = ", ".join(entry.name for entry in self.entries if entry.state is State.ON) or "none"
+            raise UserError(f"no fault {name!r} is in force; expected one of: {known}")
+        for entry in on:
+            entry.ends = elapsed
+        return self.advance(elapsed)
 
     def orders(self, elapsed: float) -> list[Order]:
-        """All orders that are due and not confirmed, `elapsed` seconds after the live trial's start."""
-        due = []
-        for number, crash in enumerate(self._crashes):
-            if crash.fault.at <= elapsed and crash.fired_at is None:
-                crash.ordered = True
-                due.append(Order(2 * number, Deed.KILL, crash.fault.robot, f"crash at {crash.fault.at:g} s"))
-            back = crash.fault.restart_at
-            if back is not None and back <= elapsed and crash.fired_at is not None and not crash.returned:
-                due.append(Order(2 * number + 1, Deed.START, crash.fault.robot, f"restart at {back:g} s"))
+        """All orders that are due and not confirmed."""
+        due = [entry.order for entry in self.entries if entry.order is not None]
         return due + [order for robot, order in self._joining.items() if self._joins[robot] <= elapsed]
 
-    def presence(self, robot: str, present: bool, elapsed: float) -> bool:
-        """`robot` came or went; whether that confirms an order."""
-        if present and self._joining.pop(robot, None) is not None:
-            return True
-        for crash in self._crashes:
-            if crash.fault.robot == robot and crash.ordered:
-                if not present and crash.fired_at is None:
-                    crash.fired_at = elapsed
-                    return True
-                if present and crash.fired_at is not None and crash.fault.restart and not crash.returned:
-                    crash.returned = True
-                    return True
-        return False
+    def done(self, number: int, elapsed: float) -> None:
+        """Whoever holds the processes has carried out an order."""
+        for entry in self.entries:
+            if entry.order is not None and entry.order.number == number:
+                if entry.order.deed is Deed.HANG:
+                    entry.fire(elapsed)
+                if entry.order.deed in {Deed.HANG, Deed.RESUME}:
+                    entry.order = None
+
+    def presence(self, robot: str, present: bool, elapsed: float) -> None:
+        """`robot` came or went, which may confirm an order."""
+        if present:
+            self._joining.pop(robot, None)
+        awaited = Deed.START if present else Deed.KILL
+        for entry in self.entries:
+            if entry.order is not None and entry.order.robot == robot and entry.order.deed is awaited:
+                if not present:
+                    entry.fire(elapsed)
+                entry.order = None
+
+    def is_hung(self, robot: str) -> bool:
+        """Whether the robot's process is to be stopped just now."""
+        return any(isinstance(entry.fault, Hang) and robot_of(entry.fault) == robot for entry in self._on())
+
+    def pace(self, robot: str, task: str) -> float:
+        """How fast a robot's body works on `task`: 1 as always, 0 not at all."""
+        pace = 1.0
+        for entry in self._holding(robot, task):
+            pace = pace / entry.fault.factor if isinstance(entry.fault, Slow) else 0.0
+        return pace
+
+    def worked(self, robot: str, task: str, elapsed: float) -> None:
+        """The robot's body worked on `task` for a while: a fault that held it up has fired."""
+        for entry in self._holding(robot, task):
+            if not isinstance(entry.fault, Hang):
+                entry.fire(elapsed)
+
+    def _holding(self, robot: str, task: str) -> list[Entry]:
+        return [entry for entry in self._on() if _holds_up(entry.fault, robot, task)]
+
+    def _on(self) -> list[Entry]:
+        return [entry for entry in self.entries if entry.state is State.ON]
+
+    def rules(self) -> list[LinkRule]:
+        """The link rules in force."""
+        return [rule for entry in self._on() for rule in link_rules(entry.fault, entry.name)]
+
+    def blind(self) -> list[Blindness]:
+        """The robots whose sensory feedback is held back just now."""
+        return [
+            Blindness(fault=entry.name, robot=entry.fault.robot, delay=entry.fault.delay)
+            for entry in self._on()
+            if isinstance(entry.fault, Blind)
+        ]
+
+    def touched(self, effects: list[Effect], elapsed: float) -> None:
+        """What faults have newly done to messages."""
+        by_name = {entry.name: entry for entry in self.entries}
+        for effect in effects:
+            if effect.count > 0 and effect.fault in by_name:
+                by_name[effect.fault].fire(elapsed, effect.count)
 
     def report(self) -> list[dict[str, Any]]:
-        """Each scheduled fault, and whether and how often it fired."""
-        return [
-            {
-                "kind": crash.fault.kind,
-                "robot": crash.fault.robot,
-                "at": crash.fault.at,
-                "fired": crash.fired_at is not None,
-                "fired_at": crash.fired_at,
-                "count": int(crash.fired_at is not None),
-            }
-            for crash in self._crashes
-        ]
+        """Each fault, and whether and how often it fired."""
+        return [entry.report() for entry in self.entries]
+
+
+def _holds_up(fault: Fault, robot: str, task: str) -> bool:
+    match fault:
+        case Stuck():
+            return fault.robot == robot and fault.task in {None, task}
+        case Slow() | Hang():
+            return fault.robot == robot
+        case _:
+            return False

@@ -12,7 +12,10 @@ Every key begins with `lalliance/<mission>/`. What follows:
     mind/<robot>/motivation     robot -> anybody     all motivations and factors
     link/<robot>                robot -> anybody     what it received, and from whom
     world/event, world/status   world -> anybody     what happened; how the mission stands
-    @chaos/rules, @chaos/command                     link rules in force; inject and heal
+    @chaos/rules                world -> every bus   the link rules in force
+    @chaos/command              operator -> world    a query: inject, heal, or tell what is in force
+    @chaos/deed                 launcher -> world    a process was killed, started, stopped or continued
+    @chaos/launcher             presence of whoever holds the robots' processes
     alive/<robot>               presence of a process
 
 Example: robot `lifter` of mission `warehouse` on task `crate-1` announces itself on
@@ -34,8 +37,10 @@ ROOT = "lalliance"
 NAME_PATTERN = r"^[A-Za-z0-9_-]{1,64}$"
 SENDER_PATTERN = r"^@?[A-Za-z0-9_-]{1,64}$"
 
-#: The world server, as a sender.
+#: The world server, whoever holds the robots' processes, and whoever gives commands, as senders.
 WORLD = "@world"
+LAUNCHER = "@launcher"
+OPERATOR = "@operator"
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
@@ -56,6 +61,8 @@ class Kind(StrEnum):
     STATUS = "world/status"
     CHAOS_RULES = "@chaos/rules"
     CHAOS_COMMAND = "@chaos/command"
+    CHAOS_DEED = "@chaos/deed"
+    LAUNCHER = "@chaos/launcher"
     ALIVE = "alive/{robot}"
 
 
@@ -68,8 +75,8 @@ class Key(NamedTuple):
 
     @property
     def speaker(self) -> str | None:
-        """Who alone may speak on this key: the robot in it, or the world."""
-        return WORLD if self.kind in _OF_WORLD else self.robot
+        """Who alone may speak on this key: the robot in it, the world or the launcher."""
+        return _SPEAKERS.get(self.kind, self.robot)
 
     @property
     def stream(self) -> tuple[str | None, str | None]:
@@ -79,7 +86,8 @@ class Key(NamedTuple):
         return (self.kind.format(robot=self.robot, task=self.task), None)
 
 
-_OF_WORLD = {Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.EVENT, Kind.STATUS}
+_OF_WORLD = (Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.EVENT, Kind.STATUS, Kind.CHAOS_RULES)
+_SPEAKERS = {**dict.fromkeys(_OF_WORLD, WORLD), Kind.CHAOS_COMMAND: OPERATOR, Kind.CHAOS_DEED: LAUNCHER}
 
 
 def _shapes() -> dict[tuple[str, ...], Kind]:

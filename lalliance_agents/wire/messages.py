@@ -131,6 +131,17 @@ class Reception(BaseModel):
     """Time since the last message, in seconds."""
 
 
+class Effect(BaseModel):
+    """What one fault did to the messages that came from one teammate, or from the world."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="ignore")
+
+    fault: Word
+    sender: Sender
+    count: Count
+    """Messages that were lost, delayed, doubled, reordered or held back."""
+
+
 class LinkReport(Message):
     """What a robot sent and received, and whether it kept its control period."""
 
@@ -139,6 +150,8 @@ class LinkReport(Message):
     dropped: dict[str, Count]
     """Messages not used, by reason."""
     teammates: dict[Name, Reception]
+    effects: Annotated[list[Effect], Field(fail_fast=True)] = []
+    """What faults did to messages on their arrival here."""
     ticks: Count
     missed: Count
     """Control periods that passed without a control step since the mission began."""
@@ -170,6 +183,82 @@ class Status(Message):
     robots: dict[Name, Scalars]
 
 
+Globs = Annotated[list[Annotated[str, Field(max_length=64)]], Field(fail_fast=True)]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class LinkRule(BaseModel):
+    """A link rule in force; `lalliance_agents.faults` has the forms in which people write it."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="ignore", allow_inf_nan=False)
+
+    fault: Word
+    """The fault that it belongs to."""
+    senders: Globs
+    receivers: Globs
+    cut: bool = False
+    loss: Share = 0.0
+    """Probability of loss; where there are bursts, outside of them."""
+    burst_loss: Share = 0.0
+    burst_enter: Share = 0.0
+    """Probability that a burst begins with a message; 0: there are no bursts."""
+    burst_leave: Share = 1.0
+    delay: Literal["none", "constant", "uniform", "lognormal"] = "none"
+    delay_by: Seconds = 0.0
+    delay_to: Seconds = 0.0
+    """Constant: the delay, twice; uniform: shortest and longest; lognormal: median, and sigma of the logarithm."""
+    duplicate: Share = 0.0
+    reorder: Share = 0.0
+    held: Seconds = 0.0
+
+
+class Blindness(BaseModel):
+    """A robot whose sensory feedback is held back."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="ignore", allow_inf_nan=False)
+
+    fault: Word
+    robot: Name
+    delay: Seconds | None = None
+    """How late it comes, in seconds; None: not at all."""
+
+
+class ChaosRules(Message):
+    """All that is in force of faults made where messages arrive."""
+
+    seed: Count
+    rules: Annotated[list[LinkRule], Field(fail_fast=True)] = []
+    blind: Annotated[list[Blindness], Field(fail_fast=True)] = []
+
+
+class ChaosCommand(Message):
+    """What an operator asks of the world."""
+
+    verb: Literal["inject", "heal", "status"]
+    fault: str = Field(default="", max_length=2000)
+    """inject: the fault as JSON, in the fields of a mission file; `at` is the present instant."""
+    lasts: Seconds | None = None
+    """inject: how long it is in force, in seconds; None: what the fault itself says."""
+    name: Word = ""
+    """heal: which fault; empty: all."""
+
+
+class ChaosAnswer(Message):
+    """What the world says to a command."""
+
+    done: bool
+    text: Line
+    faults: Annotated[list[Scalars], Field(fail_fast=True)] = []
+    """Every fault of the mission, in the words of the summary."""
+
+
+class DeedDone(Message):
+    """An order of the world was carried out at a process."""
+
+    number: Count
+    """The order's."""
+
+
 BODY_OF: dict[Kind, type[Message]] = {
     Kind.ACTIVITY: Activity,
     Kind.HEARTBEAT: Heartbeat,
@@ -182,6 +271,9 @@ BODY_OF: dict[Kind, type[Message]] = {
     Kind.LINK: LinkReport,
     Kind.EVENT: Event,
     Kind.STATUS: Status,
+    Kind.CHAOS_RULES: ChaosRules,
+    Kind.CHAOS_COMMAND: ChaosCommand,
+    Kind.CHAOS_DEED: DeedDone,
 }
 
 M = TypeVar("M", bound=Message)

@@ -57,7 +57,7 @@ async def test_only_fresh_messages_of_others_who_speak_for_themselves_are_handed
         Sample(KEYS.build(Kind.HEARTBEAT, robot="right"), b"\xc1"),
         Sample("lalliance/m/heartbeat/*", b""),
         Sample("lalliance/other/heartbeat/right", b""),
-        Sample(KEYS.build(Kind.CHAOS_RULES), b""),
+        Sample(KEYS.build(Kind.LAUNCHER), b""),
     )
     assert ear.heard == [("right", 5), ("right", 3), ("right", 1)]
     assert ear.messenger.received == 3
@@ -67,7 +67,7 @@ async def test_only_fresh_messages_of_others_who_speak_for_themselves_are_handed
         "dropping messages of @world: sender: right on a key of @world",
         "dropping messages of right: msgpack: FormatError",
         "dropping messages of an unknown key: key: 'lalliance/m/heartbeat/*' is not a key of this mission",
-        "dropping messages of lalliance/m/@chaos/rules: key: CHAOS_RULES carries no message",
+        "dropping messages of lalliance/m/@chaos/launcher: key: LAUNCHER carries no message",
     ]
 
 

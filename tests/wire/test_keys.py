@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lalliance_agents.bus.patterns import check_key, check_pattern, matches
 from lalliance_agents.errors import MessageError
-from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
+from lalliance_agents.wire.keys import LAUNCHER, OPERATOR, WORLD, Key, Keys, Kind
 
 KEYS = Keys("warehouse")
 NAMES = st.text(string.ascii_letters + string.digits + "_-", min_size=1, max_size=64)
@@ -25,8 +25,10 @@ SPELLED = {
     Kind.LINK: ("link/lifter", "lifter", None, "lifter"),
     Kind.EVENT: ("world/event", None, None, WORLD),
     Kind.STATUS: ("world/status", None, None, WORLD),
-    Kind.CHAOS_RULES: ("@chaos/rules", None, None, None),
-    Kind.CHAOS_COMMAND: ("@chaos/command", None, None, None),
+    Kind.CHAOS_RULES: ("@chaos/rules", None, None, WORLD),
+    Kind.CHAOS_COMMAND: ("@chaos/command", None, None, OPERATOR),
+    Kind.CHAOS_DEED: ("@chaos/deed", None, None, LAUNCHER),
+    Kind.LAUNCHER: ("@chaos/launcher", None, None, None),
     Kind.ALIVE: ("alive/lifter", "lifter", None, "lifter"),
 }
 

@@ -26,6 +26,16 @@ RECEPTIONS = st.builds(messages.Reception, received=COUNTS, silence=st.none() | 
 STAGES = st.sampled_from(["waiting", "running", "complete", "failed"])
 LEARNING = st.sampled_from(["active", "adaptive"])
 
+EFFECTS = st.builds(messages.Effect, fault=st.text(max_size=8), sender=st.just(WORLD) | NAMES, count=COUNTS)
+GLOBS = st.lists(st.text("ab*?", max_size=8), max_size=3)
+SHARES = st.floats(0, 1)
+RULES = st.builds(
+    messages.LinkRule, fault=st.text(max_size=8), senders=GLOBS, receivers=GLOBS, cut=st.booleans(), loss=SHARES,
+    burst_loss=SHARES, burst_enter=SHARES, burst_leave=SHARES, duplicate=SHARES, reorder=SHARES, held=SECONDS,
+    delay=st.sampled_from(["none", "constant", "uniform", "lognormal"]), delay_by=SECONDS, delay_to=SECONDS,
+)  # fmt: skip
+BLIND = st.builds(messages.Blindness, fault=st.text(max_size=8), robot=NAMES, delay=st.none() | SECONDS)
+
 FIELDS: dict[Kind, dict[str, st.SearchStrategy[Any]]] = {
     Kind.ACTIVITY: {"task": NAMES, "trial": COUNTS, "active_for": SECONDS, "expected": SECONDS},
     Kind.HEARTBEAT: {"trial": COUNTS},
@@ -45,7 +55,8 @@ FIELDS: dict[Kind, dict[str, st.SearchStrategy[Any]]] = {
     Kind.MOTIVATION: {"active": st.lists(NAMES, max_size=3), "sets": st.dictionaries(NAMES, SCALARS, max_size=3)},
     Kind.LINK: {
         "sent": COUNTS, "received": COUNTS, "dropped": st.dictionaries(st.text(max_size=8), COUNTS, max_size=3),
-        "teammates": st.dictionaries(NAMES, RECEPTIONS, max_size=3), "ticks": COUNTS, "missed": COUNTS,
+        "teammates": st.dictionaries(NAMES, RECEPTIONS, max_size=3), "effects": st.lists(EFFECTS, max_size=3),
+        "ticks": COUNTS, "missed": COUNTS,
         "final": st.booleans(),
     },
     Kind.EVENT: {
@@ -56,6 +67,14 @@ FIELDS: dict[Kind, dict[str, st.SearchStrategy[Any]]] = {
         "mission": STAGES, "trial": COUNTS, "trials": COUNTS, "learning": LEARNING, "elapsed": SECONDS,
         "tasks": st.dictionaries(NAMES, SCALARS, max_size=3), "robots": st.dictionaries(NAMES, SCALARS, max_size=3),
     },
+    Kind.CHAOS_RULES: {
+        "seed": COUNTS, "rules": st.lists(RULES, max_size=3), "blind": st.lists(BLIND, max_size=3),
+    },
+    Kind.CHAOS_COMMAND: {
+        "verb": st.sampled_from(["inject", "heal", "status"]), "fault": st.text(max_size=30), "lasts": st.none() | SECONDS,
+        "name": st.text(max_size=8),
+    },
+    Kind.CHAOS_DEED: {"number": COUNTS},
 }  # fmt: skip
 
 
