@@ -21,7 +21,9 @@ from pydantic_core import PydanticCustomError
 
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import MissionError
+from lalliance_agents.faults import AnyFault, Fault
 from lalliance_agents.mission_errors import Finding, Place, Spot, dotted, explain, kind_of, line_of, one_line, short
+from lalliance_agents.model.parameters import Record
 
 LARGEST = 2**20
 """Longest mission file, in bytes."""
@@ -51,6 +53,33 @@ def parse_mission(text: str, source: str) -> Mission:
         MissionError: the text does not hold a mission.
     """
     return MissionText(text, source).mission()
+
+
+class _OneFault(Record):
+    """A document that holds one fault."""
+
+    fault: AnyFault
+
+
+def read_fault(text: str) -> Fault:
+    """The fault in `text`, which spells it as JSON in the fields of a mission file; `at` may be left out.
+
+    Raises:
+        MissionError: the text does not hold a fault; the sentence names the field, the value and what was expected.
+    """
+    source = "command"
+    try:
+        content = json.loads(text)
+        document = {"fault": {"at": 0, **content} if isinstance(content, dict) else content}
+        holder = MissionText(json.dumps(document), source)
+        try:
+            return _OneFault.model_validate_json(json.dumps(holder.document), strict=True).fault
+        except ValidationError as error:
+            raise holder.error(error, _OneFault) from None
+    except MissionError as error:
+        raise MissionError(str(error).removeprefix(f"{source}:1: ")) from None
+    except (ValueError, RecursionError):
+        raise MissionError(f"{short(text)!r} is not a fault; expected JSON with the fields of a mission file") from None
 
 
 def load_mission_text(path: Path) -> "MissionText":

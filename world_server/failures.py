@@ -16,6 +16,7 @@ from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
 from lalliance_agents.fault_checks import contradiction
 from lalliance_agents.faults import Blind, Crash, Fault, Hang, Slow, Stuck, describe, kind_of, robot_of
+from lalliance_agents.model.equations import reaches
 from lalliance_agents.wire.messages import Blindness, Effect, LinkRule
 from world_server.rules import link_rules
 
@@ -60,6 +61,11 @@ class Entry:
     fired_at: float | None = None
     order: Order | None = None
     """What is yet to be confirmed."""
+
+    @property
+    def must_die(self) -> bool:
+        """Whether a process is to be killed and was not seen to end yet."""
+        return self.order is not None and self.order.deed is Deed.KILL
 
     def fire(self, elapsed: float, count: int = 1) -> None:
         """Its effect was seen, `count` times more."""
@@ -121,16 +127,18 @@ class Failures:
     def next_instant(self, elapsed: float) -> float:
         """The next instant after `elapsed` at which a fault begins or ends; infinite if none does."""
         due = [entry.begins for entry in self.entries if entry.state is State.WAITING]
-        due += [entry.ends for entry in self.entries if entry.state is State.ON]
-        return min([*due, *(self._joins[robot] for robot in self._joining)], default=math.inf)
+        due += [entry.ends for entry in self.entries if entry.state is State.ON and not reaches(elapsed, entry.ends)]
+        due += [self._joins[robot] for robot in self._joining if not reaches(elapsed, self._joins[robot])]
+        return min(due, default=math.inf)
 
     def advance(self, elapsed: float) -> list[Change]:
         """Let faults begin and end that are due at `elapsed`; what changed."""
         changes = []
         for entry in self.entries:
-            if entry.state is State.WAITING and entry.begins <= elapsed:
+            if entry.state is State.WAITING and reaches(elapsed, entry.begins):
                 changes.append(self._begin(entry))
-            if entry.state is State.ON and entry.ends <= elapsed:
+            # A robot is not started again before it was seen to be dead.
+            if entry.state is State.ON and reaches(elapsed, entry.ends) and not entry.must_die:
                 changes.append(self._end(entry))
         return changes
 
@@ -146,7 +154,9 @@ class Failures:
     def _end(self, entry: Entry) -> Change:
         entry.state = State.OVER
         robot = robot_of(entry.fault) or ""
-        if isinstance(entry.fault, Crash):
+        if entry.must_die:
+            entry.order = None
+        elif isinstance(entry.fault, Crash):
             entry.order = self._order(Deed.START, robot, f"restart at {entry.ends:g} s")
         elif isinstance(entry.fault, Hang):
             entry.order = self._order(Deed.RESUME, robot, f"hang until {entry.ends:g} s")
@@ -163,20 +173,16 @@ class Failures:
         Raises:
             UserError: the fault does not fit the team or contradicts another one.
         """
-        length = fault.end - fault.at if lasts is None else lasts
-        ends = elapsed + length
-        timed = fault.model_copy(update={"at": elapsed, "until": None if ends == math.inf else ends})
+        ends = elapsed + (fault.end - fault.at if lasts is None else lasts)
+        timed = _timed(fault, elapsed, ends)
         wrong = self._mission.misfit(timed)
         if wrong is not None:
             raise UserError(f"{'.'.join(map(str, wrong[0]))}: {wrong[1]}")
         for entry in self.entries:
-            if entry.state is not State.OVER:
-                earlier = entry.fault.model_copy(
-                    update={"at": entry.begins, "until": None if entry.ends == math.inf else entry.ends}
-                )
-                against = contradiction(timed, earlier, self._mission.robots)
-                if against is not None:
-                    raise UserError(f"{against} (see fault {entry.name})")
+            earlier = _timed(entry.fault, entry.begins, entry.ends)
+            against = contradiction(timed, earlier, self._mission.robots) if entry.state is not State.OVER else None
+            if against is not None:
+                raise UserError(f"{against} (see fault {entry.name})")
         entry = self._add(timed, elapsed, ends)
         return entry, self.advance(elapsed)
 
@@ -192,12 +198,12 @@ class Failures:
             raise UserError(f"no fault {name!r} is in force; expected one of: {known}")
         for entry in on:
             entry.ends = elapsed
-        return self.advance(elapsed)
+        return [self._end(entry) for entry in on]
 
     def orders(self, elapsed: float) -> list[Order]:
         """All orders that are due and not confirmed."""
         due = [entry.order for entry in self.entries if entry.order is not None]
-        return due + [order for robot, order in self._joining.items() if self._joins[robot] <= elapsed]
+        return due + [order for robot, order in self._joining.items() if reaches(elapsed, self._joins[robot])]
 
     def done(self, number: int, elapsed: float) -> None:
         """Whoever holds the processes has carried out an order."""
@@ -233,7 +239,7 @@ class Failures:
     def worked(self, robot: str, task: str, elapsed: float) -> None:
         """The robot's body worked on `task` for a while: a fault that held it up has fired."""
         for entry in self._holding(robot, task):
-            if not isinstance(entry.fault, Hang):
+            if entry.fired_at is None and not isinstance(entry.fault, Hang):
                 entry.fire(elapsed)
 
     def _holding(self, robot: str, task: str) -> list[Entry]:
@@ -264,6 +270,10 @@ class Failures:
     def report(self) -> list[dict[str, Any]]:
         """Each fault, and whether and how often it fired."""
         return [entry.report() for entry in self.entries]
+
+
+def _timed(fault: Fault, begins: float, ends: float) -> Fault:
+    return fault.model_copy(update={"at": begins, "until": None if ends == math.inf else ends})
 
 
 def _holds_up(fault: Fault, robot: str, task: str) -> bool:

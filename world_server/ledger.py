@@ -138,12 +138,13 @@ class Ledger:
         if latest is not None and latest.ended is None:
             latest.ended = cause[:MOST_LETTERS]
 
-    def reported(self, report: LinkReport) -> None:
-        """A robot's counters, which replace the ones it reported before in this incarnation."""
+    def reported(self, report: LinkReport) -> LinkReport | None:
+        """A robot's counters, which replace the ones it reported before in this incarnation; its report before."""
         before = self._links.get(report.sender)
         if before is not None and before.incarnation != report.incarnation:
             self._earlier_lives.add(before)
         self._links[report.sender] = report
+        return before
 
     def has_final(self, robot: str) -> bool:
         """Whether the latest life of `robot` has reported its counters for the last time."""

@@ -1,5 +1,7 @@
 """From faults of links as people write them to link rules as they go over the bus."""
 
+from typing import Any
+
 from lalliance_agents.faults import (
     Bursts,
     Fault,
@@ -21,7 +23,7 @@ def link_rules(fault: Fault, name: str) -> list[LinkRule]:
     """
     match fault:
         case LinkFault():
-            effects = {"cut": fault.cut, **_loss(fault), **_delay(fault), **_others(fault)}
+            effects: dict[str, Any] = {"cut": fault.cut, **_loss(fault), **_delay(fault), **_others(fault)}
             return [
                 LinkRule(fault=name, senders=list(senders), receivers=list(receivers), **effects)
                 for senders, receivers in fault.pairs()

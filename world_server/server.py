@@ -15,8 +15,9 @@ from lalliance_agents.bus.patterns import matches
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import MessageError, UserError
-from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
-from lalliance_agents.wire.messages import LONGEST_LINE, Action, DecisionMade, LinkReport, Message
+from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
+from lalliance_agents.wire.messages import LONGEST_LINE, Action, DecisionMade, DeedDone, LinkReport, Message
+from world_server.chaos import ChaosDesk
 from world_server.environments.base import TaskView
 from world_server.failures import Order
 from world_server.world import Happening, World
@@ -56,6 +57,8 @@ class WorldServer:
         self._keys = Keys(mission.name)
         self._messenger = Messenger(bus, self._keys, WORLD, incarnation, self._clock.now)
         self._world = World(mission, self._clock.now(), self._tell)
+        self._desk = ChaosDesk(self._world, self._messenger, self._clock.now, self._publish_rules)
+        self._told_rules: dict[str, Any] = {}
         self._published: dict[str, tuple[int, TaskView]] = {}
         self._told_stage: tuple[str, int] | None = None
         self._refresh_due = self._status_due = 0.0
@@ -67,10 +70,13 @@ class WorldServer:
         Raises:
             UserError: another world server serves this mission.
         """
-        watching: Registration | None = None
+        registrations: list[Registration] = []
         try:
             await self._open()
-            watching = await self._bus.watch_presence(self._keys.build(Kind.ALIVE), self._see)
+            alive, launcher, command = map(self._keys.build, (Kind.ALIVE, Kind.LAUNCHER, Kind.CHAOS_COMMAND))
+            registrations.append(await self._bus.watch_presence(alive, self._see))
+            registrations.append(await self._bus.watch_presence(launcher, self._see))
+            registrations.append(await self._bus.answer(command, self._desk.answer))
             give_up_waiting = self._clock.now() + self._patience * self._speed
             while not self._world.over:
                 now = self._clock.now()
@@ -82,8 +88,8 @@ class WorldServer:
             await self._say_farewell()
             return self._world.summary()
         finally:
-            if watching is not None:
-                await watching.close()
+            for registration in registrations:
+                await registration.close()
             await self._messenger.close()
 
     async def _open(self) -> None:
@@ -94,7 +100,8 @@ class WorldServer:
             )
         await messenger.offer(keys.build(Kind.SENSE_TASK), self._answer_tasks)
         await messenger.offer(keys.build(Kind.SENSE_ROBOT), self._answer_bodies)
-        for kind in (Kind.ACTION, Kind.DECISION, Kind.LINK):
+        await messenger.offer(keys.build(Kind.CHAOS_RULES), self._answer_rules)
+        for kind in (Kind.ACTION, Kind.DECISION, Kind.LINK, Kind.CHAOS_DEED):
             await messenger.listen(keys.build(kind), self._receive)
 
     async def _say_farewell(self) -> None:
@@ -116,20 +123,24 @@ class WorldServer:
         except MessageError as error:
             self._messenger.drop(error.reason, "an unknown key", str(error))
             return
-        if parsed.kind is Kind.ALIVE and parsed.robot is not None:
+        if parsed.kind is Kind.LAUNCHER:
+            self._world.launcher(present, self._clock.now())
+        elif parsed.kind is Kind.ALIVE and parsed.robot is not None:
             self._world.presence(parsed.robot, present, self._clock.now())
 
     def _receive(self, _: Key, message: Message) -> None:
-        if message.sender not in self._world.bodies:
+        if message.sender not in {LAUNCHER, *self._world.bodies}:
             self._messenger.drop("stranger", message.sender)
             return
         match message:
+            case DeedDone():
+                self._world.done(message.number, self._clock.now())
             case Action():
                 self._world.act(message, self._clock.now())
             case DecisionMade():
                 self._world.decided(message, self._clock.now())
             case LinkReport():
-                self._world.ledger.reported(message)
+                self._world.reported(message, self._clock.now())
 
     def _tell(self, happening: Happening) -> None:
         _log.info("%7.1f s  %s", happening.elapsed, happening.text)
@@ -158,6 +169,8 @@ class WorldServer:
     def _publish(self, now: float) -> None:
         for order in self._world.orders():
             self._order(order, now)
+        if self._rules() != self._told_rules:
+            self._publish_rules()
         stage = (self._world.stage.value, self._world.trial)
         if now >= self._refresh_due or stage != self._told_stage:
             self._told_stage = stage
@@ -172,11 +185,19 @@ class WorldServer:
             self._publish_status(now)
 
     def _publish_all(self, now: float) -> None:
+        self._publish_rules()
         for robot in self._world.bodies:
             self._messenger.send(Kind.SENSE_ROBOT, key_robot=robot, **self._body_fields())
         for task, view in self._world.tasks().items():
             self._publish_task(task, view)
         self._publish_status(now)
+
+    def _publish_rules(self) -> None:
+        self._told_rules = self._rules()
+        self._messenger.send(Kind.CHAOS_RULES, **self._told_rules)
+
+    def _rules(self) -> dict[str, Any]:
+        return {"seed": self._mission.seed, "rules": self._world.rules(), "blind": self._world.blind()}
 
     def _publish_task(self, task: str, view: TaskView) -> None:
         self._published[task] = (self._world.trial, view)
@@ -211,6 +232,10 @@ class WorldServer:
 
     def _body_fields(self) -> dict[str, Any]:
         return {"mission": self._world.stage.value, "trial": self._world.trial, "learning": self._world.learning}
+
+    def _answer_rules(self, _: str) -> list[Sample]:
+        key = self._keys.build(Kind.CHAOS_RULES)
+        return [Sample(key, self._messenger.compose(Kind.CHAOS_RULES, **self._rules()))]
 
     def _answer_tasks(self, query: str) -> list[Sample]:
         self._world.advance(self._clock.now())

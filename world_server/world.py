@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from lalliance_agents.config import Mission, Phase
-from lalliance_agents.wire.messages import Action, DecisionMade
+from lalliance_agents.errors import UserError
+from lalliance_agents.faults import Crash, Fault, Hang, describe
+from lalliance_agents.wire.messages import Action, Blindness, DecisionMade, Effect, LinkReport, LinkRule
 from world_server import environments
 from world_server.environments.base import Environment, TaskView, Work
-from world_server.failures import Failures, Order
+from world_server.failures import Change, Failures, Order
 from world_server.ledger import Ledger
 
 #: A body stops when its action was not refreshed for this long, in seconds.
@@ -72,6 +74,8 @@ class World:
         self.bodies = {robot: Body() for robot in mission.robots}
         self.ledger = Ledger(list(mission.tasks))
         self.failures = Failures(mission)
+        #: Whether somebody is there who can kill, start, stop and continue the robots' processes.
+        self.has_launcher = False
         self.trials_planned = sum(phase.trials for phase in mission.phases)
         self._tell = tell
         self._now = now
@@ -144,6 +148,7 @@ class World:
             if self.live and body.present:
                 self.failures.presence(robot, True, 0.0)
         self._report("trial", f"trial {self.trial} begins ({self.learning} learning)")
+        self._let_faults_happen()
 
     def presence(self, robot: str, present: bool, now: float) -> None:
         """A robot's process came or went."""
@@ -156,6 +161,7 @@ class World:
             return
         if self.live:
             self.failures.presence(robot, present, self.elapsed)
+            self._let_faults_happen()
         if present:
             self.ledger.returned(robot)
             self._report("present", f"{robot} is there", robot=robot)
@@ -167,10 +173,14 @@ class World:
 
     def act(self, action: Action, now: float) -> None:
         """A robot's body is to work on a task, or on none: also if this mission has no such task."""
-        self.advance(now)
         body = self.bodies.get(action.sender)
         if body is None:
             return
+        if (action.trial, action.task) == (self.trial, body.task) and now < body.refreshed + DEAD_MAN:
+            body.fewest = action.fewest
+            body.refreshed = max(body.refreshed, now)
+            return
+        self.advance(now)
         body.fewest = action.fewest
         if action.trial != self.trial:
             return
@@ -196,6 +206,77 @@ class World:
                 task=made.task,
             )
 
+    def reported(self, report: LinkReport, now: float) -> None:
+        """A robot reports what it sent and received, and what faults did to what it received."""
+        self.advance(now)
+        if report.sender in self.bodies:
+            before = self.ledger.reported(report)
+            self.failures.touched(_newly(report, before), self.elapsed)
+
+    def launcher(self, present: bool, now: float) -> None:
+        """Whoever holds the robots' processes came or went."""
+        self.advance(now)
+        self.has_launcher = present
+
+    def done(self, number: int, now: float) -> None:
+        """Whoever holds the robots' processes has carried out an order."""
+        self.advance(now)
+        self.failures.done(number, self.elapsed)
+
+    def inject(self, fault: Fault, lasts: float | None, now: float) -> str:
+        """Put a fault in force now; what was done, in a sentence.
+
+        Args:
+            fault: the fault; when it begins is not looked at.
+            lasts: how long, in seconds; None: as long as it says itself.
+            now: the present instant, in seconds.
+
+        Raises:
+            UserError: it cannot be made now, or here.
+        """
+        self.advance(now)
+        if not self._runs_live:
+            raise UserError(
+                f"faults belong to the live trial of a running mission; this one is {self.stage} {self._where}"
+            )
+        if isinstance(fault, Crash | Hang) and not self.has_launcher:
+            raise UserError(
+                f"{describe(fault)}: nobody here can reach the robots' processes; expected a mission started by "
+                "`lalliance run`, or a fault of another kind"
+            )
+        entry, changes = self.failures.inject(fault, self.elapsed, lasts)
+        self._changed(changes)
+        until = "until it is healed" if entry.ends == math.inf else f"until {entry.ends:.1f} s"
+        return f"{entry.name}: {describe(fault)}, {until}"
+
+    def heal(self, name: str, now: float) -> str:
+        """End the fault `name`, or all if that is empty; what was done, in a sentence.
+
+        Raises:
+            UserError: there is no such fault in force.
+        """
+        self.advance(now)
+        changes = self.failures.heal(name, self.elapsed)
+        self._changed(changes)
+        return f"healed {', '.join(change.entry.name for change in changes)}" if changes else "no fault is in force"
+
+    @property
+    def _where(self) -> str:
+        return f"(trial {self.trial} of {self.trials_planned})"
+
+    def _let_faults_happen(self) -> None:
+        if self._runs_live:
+            self._changed(self.failures.advance(self.elapsed))
+
+    def _changed(self, changes: list[Change]) -> None:
+        for change in changes:
+            text = describe(change.entry.fault)
+            self._report("fault", f"fault: {text}" if change.on else f"fault is over: {text}")
+            if change.on and isinstance(change.entry.fault, Crash | Hang) and not self.has_launcher:
+                self._report("warning", f"nobody here can reach the robots' processes: {text} has to be made by hand")
+        if changes:
+            self._rest()
+
     def advance(self, now: float) -> None:
         """Let time pass until `now`; an instant that has passed already changes nothing."""
         while self.stage is Stage.RUNNING and self._now < now:
@@ -203,6 +284,7 @@ class World:
             if self._pause_until is None:
                 self._work(until)
                 self._stop_dead()
+                self._let_faults_happen()
             else:
                 self._now = until
                 if until >= self._pause_until:
@@ -214,10 +296,30 @@ class World:
         if self._pause_until is not None:
             return self._pause_until
         ends = [body.refreshed + DEAD_MAN for body in self.bodies.values() if body.task is not None]
+        if self.live:
+            ends.append(self._began + self.failures.next_instant(self.elapsed))
         return min([self._began + self.mission.deadline, *ends])
 
+    def next_change(self) -> float:
+        """When a task will be completed or become (not) applicable, a fault begin or end, or the trial, at the latest.
+
+        That is if all bodies go on as they do; whoever drives the world in virtual time need not look before.
+        """
+        if self.stage is not Stage.RUNNING:
+            return math.inf
+        if self._pause_until is not None:
+            return self._pause_until
+        return min(self._next_instant(), self._now + self._environment.next_change(self._actions()))
+
     def _actions(self) -> dict[str, Work]:
-        return {robot: Work(body.task) for robot, body in self.bodies.items() if body.task is not None and body.present}
+        working = {robot: body.task for robot, body in self.bodies.items() if body.task is not None and body.present}
+        if not self.live:
+            return {robot: Work(task) for robot, task in working.items()}
+        return {
+            robot: Work(task, self.failures.pace(robot, task))
+            for robot, task in working.items()
+            if not self.failures.is_hung(robot)
+        }
 
     def _stop_dead(self) -> None:
         """The dead-man switch: bodies whose action was not refreshed for too long stop, until their robot acts again."""
@@ -236,6 +338,9 @@ class World:
 
     def _work(self, until: float) -> None:
         actions, since = self._actions(), self._now
+        if self.live and until > since:
+            for robot, work in actions.items():
+                self.failures.worked(robot, work.task, self.elapsed)
         for done in self._environment.step(until - self._now, actions):
             at = self._now + done.after - self._began
             self.ledger.completed(done.task, done.by, at)
@@ -274,9 +379,21 @@ class World:
         there = [robot for robot, body in self.bodies.items() if body.present]
         return all(self.bodies[robot].fewest >= self.mission.parameters_of(robot).trials for robot in there)
 
+    @property
+    def _runs_live(self) -> bool:
+        return self.live and self.stage is Stage.RUNNING
+
+    def rules(self) -> list[LinkRule]:
+        """The link rules in force."""
+        return self.failures.rules() if self._runs_live else []
+
+    def blind(self) -> list[Blindness]:
+        """The robots whose sensory feedback is held back."""
+        return self.failures.blind() if self._runs_live else []
+
     def orders(self) -> list[Order]:
         """Deeds at processes that are due and not confirmed."""
-        return self.failures.orders(self.elapsed) if self.live and self.stage is Stage.RUNNING else []
+        return self.failures.orders(self.elapsed) if self._runs_live else []
 
     def tasks(self) -> dict[str, TaskView]:
         """What every task looks like to the robots now: before the first trial and between trials, nothing is to do."""
@@ -297,3 +414,15 @@ class World:
             "faults": self.failures.report(),
             **self.ledger.summary(),
         }
+
+
+def _newly(report: LinkReport, before: LinkReport | None) -> list[Effect]:
+    """What faults did since the robot's report before, in this life."""
+    known: dict[tuple[str, str], int] = {}
+    if before is not None and before.incarnation == report.incarnation:
+        known = {(one.fault, one.sender): one.count for one in before.effects}
+    return [
+        Effect(fault=one.fault, sender=one.sender, count=more)
+        for one in report.effects
+        if (more := one.count - known.get((one.fault, one.sender), 0)) > 0
+    ]

@@ -61,10 +61,12 @@ class Messenger:
 
     def compose(self, kind: Kind, /, **fields: Any) -> bytes:
         """The packed message of `kind` with the next number."""
+        return encode(BODY_OF[kind](**self.header(), **fields))
+
+    def header(self) -> dict[str, Any]:
+        """The header of the next message."""
         self._seq += 1
-        return encode(
-            BODY_OF[kind](sender=self.me, incarnation=self.incarnation, seq=self._seq, at=self._clock(), **fields)
-        )
+        return {"sender": self.me, "incarnation": self.incarnation, "seq": self._seq, "at": self._clock()}
 
     def send(self, kind: Kind, /, *, key_task: str = "", key_robot: str = "", **fields: Any) -> None:
         """Publish a message of `kind` under this participant's own name.

@@ -179,7 +179,7 @@ def test_a_robot_that_joins_late_is_waited_for_by_nobody_and_ordered_until_it_is
         if now == 4.0:
             world.presence("late", True, now)
         told.append([(order.number, order.deed, order.robot) for order in world.orders()])
-    assert told == [[], [(0, "start", "late")], [], [(1, "start", "later")], [(1, "start", "later")]]
+    assert told == [[], [(1, "start", "late")], [], [(2, "start", "later")], [(2, "start", "later")]]
     world.presence("later", True, 6.5)
     assert world.orders() == []
     log.work("late", "a", 7.0, 9.0)
@@ -216,6 +216,8 @@ def test_trials_follow_each_other_after_a_pause_and_faults_belong_to_the_last() 
         "5 complete: a completed by left",
         "5 trial: trial 2 complete after 5.0 s",
         "0 trial: trial 3 begins (adaptive learning)",
+        "1 fault: fault: crash of left",
+        "1 warning: nobody here can reach the robots' processes: crash of left has to be made by hand",
         "5 complete: a completed by left",
         "5 complete: complete after 5.0 s",
     ]
@@ -325,13 +327,13 @@ def test_a_crash_is_ordered_until_it_is_seen_and_so_is_the_restart() -> None:
         if not seen or seen[-1][1] != orders:
             seen.append((now, orders))
     assert seen == [
-        (0.0, []), (2.0, [(0, "kill left")]), (4.0, []), (5.0, [(1, "start left")]), (7.0, []),
-        (20.0, [(2, "kill left")]), (22.0, []),
+        (0.0, []), (2.0, [(1, "kill left")]), (4.0, []), (5.0, [(2, "start left")]), (7.0, []),
+        (20.0, [(3, "kill left")]), (22.0, []),
     ]  # fmt: skip
-    fields = {"kind": "crash", "robot": "left", "fired": True, "count": 1}
+    fields = {"kind": "crash", "robot": "left", "text": "crash of left", "fired": True, "count": 1}
     assert world.summary()["faults"] == [
-        {**fields, "at": 2.0, "fired_at": 4.0},
-        {**fields, "at": 20.0, "fired_at": 22.0},
+        {**fields, "name": "1-crash", "at": 2.0, "until": 5.0, "state": "over", "fired_at": 4.0},
+        {**fields, "name": "2-crash", "at": 20.0, "until": None, "state": "on", "fired_at": 22.0},
     ]
 
 
@@ -341,7 +343,7 @@ def test_a_crash_that_nobody_carried_out_or_that_came_by_itself_has_not_fired() 
     world.presence("left", False, 1.0)  # by itself, before its time
     world.presence("left", True, 1.5)
     world.advance(10.0)
-    assert [order.number for order in world.orders()] == [0]
+    assert [str(order.deed) for order in world.orders()] == ["kill"]
     assert [(fault["fired"], fault["fired_at"]) for fault in world.summary()["faults"]] == [(False, None)] * 2
 
 
