@@ -14,7 +14,7 @@ from lalliance_agents.model.events import Factors, Pace, Teammate
 from lalliance_agents.model.hearing import Contact, Hearing
 from lalliance_agents.model.knowledge import Knowledge
 from lalliance_agents.model.motivation import Motivation
-from lalliance_agents.model.parameters import Architecture, Erratum, Parameters
+from lalliance_agents.model.parameters import SLACK, Architecture, Erratum, Parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +178,16 @@ class Appraisal:
         if math.isnan(rate):
             return Pace.UNDEFINED, 0.0
         return self._pace(one, moment, pace), rate
+
+    def patience_ends(self, task: str, now: float) -> float:
+        """The earliest instant after `now` at which patience with somebody on `task` runs out; infinity if there is none."""
+        earliest, own_time = math.inf, self._knowledge.own_time(task)
+        for contact in self._hearing.contacts(task):
+            phi = self._patience(contact, task, own_time)
+            if self._hearing.is_on(contact, now) and not self._hearing.heard_until(contact, now - phi):
+                ends = self._hearing.beginning(contact) + phi
+                earliest = ends if ends < earliest else earliest  # no time, erratum 10 read literally, is no less
+        return earliest - SLACK
 
     @staticmethod
     def _pace(one: Motivation, moment: Moment, pace: Pace) -> Pace:

@@ -4,6 +4,11 @@ A driver hands in what the robot perceives (`handle`) and calls `tick` once per 
 of every behaviour set, lets motivations grow or fall, stops the active set or starts one, and says what to broadcast. All
 that is decided carries the factors behind it. Sets are suppressed by the set that was active when the tick began, so a robot
 that stops one task begins to want another from the next tick on.
+
+Most ticks change nothing but ramps. A driver that wants to save them asks after a tick when the next one is needed: at the
+first instant of its grid that is not before `wake`, unless an event comes first, and at the first not before `next_lapse`.
+In between it says with `rest` which instants it left out, and lets the mind `beat` where an announcement is due. All that
+the mind decides and says is then the same, to the last bit.
 """
 
 import math
@@ -32,7 +37,8 @@ from lalliance_agents.model.events import (
 from lalliance_agents.model.hearing import Hearing
 from lalliance_agents.model.knowledge import Knowledge
 from lalliance_agents.model.motivation import Motivation
-from lalliance_agents.model.parameters import SLACK, Architecture, Erratum, Learning, Parameters
+from lalliance_agents.model.outlook import AT_ONCE, Outlook
+from lalliance_agents.model.parameters import EARLY, SLACK, Architecture, Erratum, Learning, Parameters
 
 #: Ends of an attempt after which the robot is not held to have failed.
 _BLAMELESS = {Cause.COLLISION, Cause.INAPPLICABLE, Cause.NEW_TRIAL, Cause.NOT_BEST, Cause.SUPPRESSED}
@@ -78,6 +84,8 @@ class Mind:
         self._beats = not parameters.is_literal(Erratum.IDLE_HEARTBEAT)
         self._collisions = not parameters.is_literal(Erratum.COLLISION)
         self._bored_at_work = parameters.is_literal(Erratum.BOREDOM_AT_WORK) and len(self._sets) == 1
+        self._outlook = Outlook(parameters, self._appraisal, self.hearing, len(self._sets))
+        self._wake: float | None = AT_ONCE
         self._begin_trial(Learning.ADAPTIVE, now)
 
     def __repr__(self) -> str:
@@ -105,10 +113,14 @@ class Mind:
         return {task: one.factors for task, one in self._sets.items() if one.factors is not None}
 
     def handle(self, event: Event, now: float) -> None:
-        """Take in what was perceived at `now`; what follows from it is decided at the next tick."""
+        """Take in what was perceived at `now`; what follows from it is decided at the next tick.
+
+        Anything but a refresh (`is_refresh`) makes that the very next step of the driver's grid.
+        """
         match event:
             case Heard():
                 self._hear(event, now)
+                return
             case Sensed() if event.task in self._sets:
                 self._sense(event, self._sets[event.task], now)
             case BodyFailed() if event.task in self._sets:
@@ -118,12 +130,41 @@ class Mind:
             case RosterKnown():
                 self._roster = event.robots - {self.me}
             case _:
-                pass  # about a task this robot cannot do
+                return  # about a task this robot cannot do
+        self._wake = AT_ONCE
+
+    def is_refresh(self, event: Heard, now: float) -> bool:
+        """Whether what is heard at `now` only goes on with what was heard before, so that `wake` stays as it is.
+
+        It does if the teammate is not held to be silent, its last message was about the same task (or, like this one, none
+        that this robot can do), and, on a task, it expects the same time and the monitor takes it for the same attempt.
+
+        A run is a refresh and the messages after it of the same teammate, task, attempt and expected time, as long as none
+        says to be active for less long than the one before, and none was under way for longer than tau. To hand in the last
+        of a run alone, with the instant of its arrival, leaves the mind as if all had been handed in: provided it is done
+        before any tick, before any other event (which ends the run), and before `next_lapse` is believed.
+        """
+        task = event.task if event.task in self._sets else None
+        presence = self.hearing.presence(event.robot)
+        if presence is None or presence.absent or presence.task != task:
+            return False
+        if task is None:
+            return True
+        contact = presence.contact
+        if contact is None or contact.expected != event.expected:
+            return False
+        if not 0.0 <= event.active_for < math.inf:
+            return False
+        if self._sets[task].sensory_feedback == 0:
+            return True  # no attempt is watched at a task that cannot be worked on
+        return self.knowledge.monitors[task].goes_on(event.robot, now, event.active_for)
 
     def _hear(self, event: Heard, now: float) -> None:
         if event.robot == self.me:
             return
-        self.hearing.heard(event.robot, now)
+        if not self.is_refresh(event, now):
+            self._wake = AT_ONCE
+        self.hearing.heard(event.robot, now, event.task if event.task in self._sets else None)
         for task, monitor in self.knowledge.monitors.items():
             if task != event.task:
                 monitor.elsewhere(event.robot, now)
@@ -164,8 +205,44 @@ class Mind:
             else:
                 self._grow(one, factors, moment)
         activations = self._activate(now)
-        self.hearing.note_checked()
+        any_news = self.hearing.note_checked()
+        at_rest = not (commands or activations or any_news or self._outlook.restless)
+        self._wake = None if at_rest else AT_ONCE
         return commands + activations + self._announce(now, before, urgent=bool(activations))
+
+    def wake(self) -> float:
+        """The instant before which no tick would decide or change anything, but for silences; in seconds.
+
+        A tick before it would let ramps grow and announce what is due, no more; it may be early, and a tick then does no
+        harm. Minus infinity asks for the next step of the grid, infinity for none. It holds after a tick until an event is
+        handled that is no refresh (`is_refresh`), which makes it minus infinity. Learned times are not to be restored
+        in between.
+        """
+        if self._wake is None:
+            self._wake = self._foresee(self._before) - EARLY
+        return self._wake
+
+    def _foresee(self, now: float) -> float:
+        changes = [monitor.settles_at() for monitor in self.knowledge.monitors.values()]
+        if self._waiting:
+            changes.append(self._born + self.parameters.silence_timeout)
+        elif not self.active:
+            rate, threshold = self.parameters.effective_boredom_rate, self.parameters.boredom_threshold
+            if not equations.reaches(equations.boredom(rate, now - self._idle_since), threshold):
+                changes.append(equations.ramp_reaches(0.0, self._idle_since, rate, threshold))
+        changes += [self._outlook.next_change(one, now) for one in self._sets.values()]
+        return min(changes, default=math.inf)
+
+    def next_lapse(self) -> float:
+        """The earliest instant at which a tick may find somebody silent that was not; cheap, and moved by each message.
+
+        It may be early, never late, for what has been handed in; see `is_refresh` for what may be held back till now.
+        """
+        return self.hearing.next_lapse()
+
+    def rest(self, until: float) -> None:
+        """The steps up to and including `until`, at which nothing was to be done, were left out; none is undone."""
+        self._before = max(self._before, until)
 
     def _moment(self, now: float, before: float, working: list[str]) -> Moment:
         if self._waiting and self._roster_heard(now):
@@ -280,10 +357,24 @@ class Mind:
             return Cause.IMPATIENCE, latest.robot
         return (Cause.RELEASED if latest.present else Cause.SILENCE), latest.robot
 
+    @property
+    def broadcast_due(self) -> float:
+        """The instant at which the next announcement is due."""
+        return self._broadcast_due
+
+    def is_broadcast_due(self, now: float, before: float) -> bool:
+        """Whether the step at `now`, after one at `before`, is to announce: it is the first nearest to the instant due."""
+        half_a_step = (now - before) / 2
+        return now >= self._broadcast_due - half_a_step - SLACK
+
+    def beat(self, now: float) -> list[Command]:
+        """A step at `now` that does no more than a tick with nothing to decide: announce what is due."""
+        before, self._before = self._before, now
+        return self._announce(now, before, urgent=False)
+
     def _announce(self, now: float, before: float, *, urgent: bool) -> list[Command]:
         """Broadcast at rate rho, by the tick nearest to the instant due, and at once on activation."""
-        half_a_step = (now - before) / 2
-        if not urgent and now < self._broadcast_due - half_a_step - SLACK:
+        if not urgent and not self.is_broadcast_due(now, before):
             return []
         period = self.parameters.broadcast_period
         kept = self._broadcast_due + period

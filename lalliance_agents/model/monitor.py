@@ -10,6 +10,7 @@ more than tau after it was last heard, a new attempt has begun. A teammate heard
 may still be working and is not judged before the task is complete or the teammate is heard again.
 """
 
+import math
 from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -110,6 +111,16 @@ class Monitor:
             attempt = self._attempts[robot]
             if attempt.left is not None and more_than(now - attempt.left, self._tau):
                 self._fail(robot, attempt)
+
+    def settles_at(self) -> float:
+        """The instant after which `settle` has something to judge."""
+        left = [attempt.left for attempt in self._attempts.values() if attempt.left is not None]
+        return min(left, default=math.inf) + self._tau
+
+    def goes_on(self, robot: str, now: float, active_for: float) -> bool:
+        """Whether a message of `robot`, that it is on the task since `active_for` seconds, tells of the attempt known."""
+        attempt = self._attempts.get(robot)
+        return attempt is not None and attempt.left is None and self._goes_on(attempt, now, active_for)
 
     def began(self, now: float) -> None:
         """The robot itself begins an attempt."""
