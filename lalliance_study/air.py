@@ -49,11 +49,6 @@ class AirLink:
         every_step: whether every message is taken for news.
     """
 
-    __slots__ = (
-        "_announce_news", "_content", "_every_step", "_incarnation", "_latest", "_seq", "effects", "hearer", "received", "rule", "sender",
-        "stale", "strange", "waiting", "lost",
-    )  # fmt: skip
-
     def __init__(
         self, sender: str, hearer: Hearer, announce_news: Callable[[float], None], *, every_step: bool
     ) -> None:

@@ -13,7 +13,7 @@ from enum import Enum
 from lalliance_agents.agent import translate
 from lalliance_agents.agent.behavior import TaskSense
 from lalliance_agents.agent.briefing import chance_of, new_mind, roster, tasks_of
-from lalliance_agents.bus.session import LEASE
+from lalliance_agents.bus.base import LEASE
 from lalliance_agents.config import Mission
 from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, Heard, TrialStarted
 from lalliance_agents.model.mind import Mind
@@ -212,12 +212,12 @@ class Member:
         """The first control step that is not before `instant` and still to come."""
         if instant == math.inf:
             return NEVER
+        if instant <= self._instant(self._step):
+            return self._step
         step = max(math.ceil((instant - self._first) / self._period - SLACK), self._step)
         while self._instant(step) < instant:
             step += 1
-        while step > self._step and self._instant(step - 1) >= instant:
-            step -= 1
-        return step
+        return step if self._instant(step - 1) < instant else step - 1
 
     def _wake(self, now: float) -> None:
         """Make a whole step as soon as possible."""

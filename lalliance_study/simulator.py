@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from lalliance_agents.agent import translate
+from lalliance_agents.bus.base import LEASE
 from lalliance_agents.bus.link import LinkRules
-from lalliance_agents.bus.session import LEASE
 from lalliance_agents.config import Mission
 from lalliance_agents.model.events import Decision
 from lalliance_agents.wire.keys import WORLD
@@ -23,8 +23,7 @@ from lalliance_study.air import AirLink
 from lalliance_study.member import Member, Process
 from world_server.environments.base import TaskView
 from world_server.failures import Deed, Order
-from world_server.server import REFRESH_PERIOD, STEP
-from world_server.world import Happening, World
+from world_server.world import REFRESH_PERIOD, STEP, Happening, Stage, World
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,7 +323,7 @@ class Simulator:
         self._looked = number
         self._look_at = math.inf
         world = self.world
-        if not world.missing():
+        if world.stage is Stage.WAITING and not world.missing():
             world.begin(self.now)
         world.advance(self.now)
         for order in world.orders():

@@ -225,6 +225,11 @@ class Failures:
                     entry.fire(elapsed)
                 entry.order = None
 
+    @property
+    def hold_up(self) -> bool:
+        """Whether any body may be held up just now."""
+        return any(isinstance(entry.fault, Hang | Stuck | Slow) for entry in self._on())
+
     def is_hung(self, robot: str) -> bool:
         """Whether the robot's process is to be stopped just now."""
         return any(isinstance(entry.fault, Hang) and robot_of(entry.fault) == robot for entry in self._on())

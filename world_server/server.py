@@ -20,14 +20,12 @@ from lalliance_agents.wire.messages import LONGEST_LINE, Action, DecisionMade, D
 from world_server.chaos import ChaosDesk
 from world_server.environments.base import TaskView
 from world_server.failures import Order
-from world_server.world import Happening, World
+from world_server.world import REFRESH_PERIOD, STEP, Happening, World
 
 _log = logging.getLogger(__name__)
 
-#: Time between two steps, in mission seconds, and at least in real ones.
-STEP = 0.05
+#: Least time between two steps, in real seconds.
 LEAST_STEP = 0.01
-REFRESH_PERIOD = 1.0
 #: How long to listen at the start for another world server of the mission, in real seconds.
 RIVAL_TIMEOUT = 0.5
 STATUS_PERIOD = 0.25

@@ -22,6 +22,9 @@ from world_server.environments.base import Environment, TaskView, Work
 from world_server.failures import Change, Failures, Order
 from world_server.ledger import Ledger
 
+#: Time between two looks of a world server at its world, and between two refreshes of what it publishes, in seconds.
+STEP = 0.05
+REFRESH_PERIOD = 1.0
 #: A body stops when its action was not refreshed for this long, in seconds.
 DEAD_MAN = 2.5
 #: Time between two trials, in seconds: everybody can sense the end of the one before the next begins.
@@ -313,7 +316,7 @@ class World:
 
     def _actions(self) -> dict[str, Work]:
         working = {robot: body.task for robot, body in self.bodies.items() if body.task is not None and body.present}
-        if not self.live:
+        if not (self.live and self.failures.hold_up):
             return {robot: Work(task) for robot, task in working.items()}
         return {
             robot: Work(task, self.failures.pace(robot, task))
@@ -338,16 +341,17 @@ class World:
 
     def _work(self, until: float) -> None:
         actions, since = self._actions(), self._now
-        if self.live and until > since:
+        if self.live and until > since and self.failures.hold_up:
             for robot, work in actions.items():
                 self.failures.worked(robot, work.task, self.elapsed)
-        for done in self._environment.step(until - self._now, actions):
+        completions = self._environment.step(until - self._now, actions)
+        for done in completions:
             at = self._now + done.after - self._began
             self.ledger.completed(done.task, done.by, at)
             text = f"{done.task} completed by {' and '.join(done.by)}"
             self._tell(Happening("complete", text, at, done.by[0] if done.by else None, done.task))
         self._now = until
-        if all(view.complete for view in self.tasks().values()):
+        if (completions or since == self._began) and self._environment.is_complete:
             # The trial ends with its last task, however far this step went beyond it.
             self._now = min(max(since, self._began + (self.ledger.last_completion or 0.0)), until)
             self._end_trial()
