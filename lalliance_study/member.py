@@ -33,6 +33,8 @@ class Process(Enum):
 #: What a member tells the simulator: a decision, and that its next step has changed.
 Decided = Callable[["Member", Decision], None]
 Rescheduled = Callable[["Member"], None]
+#: Told when, which robot senses of which task whether it is applicable, and complete.
+SensedHook = Callable[[float, str, str, bool, bool], None]
 
 
 class Member:
@@ -45,6 +47,7 @@ class Member:
         every_step: whether to make all control steps and to take in all messages.
         decided: called with each decision.
         rescheduled: called when `due` has changed.
+        sensed: called when a task is sensed to stand otherwise than before.
     """
 
     def __init__(
@@ -56,6 +59,7 @@ class Member:
         every_step: bool,
         decided: Decided,
         rescheduled: Rescheduled,
+        sensed: SensedHook | None = None,
     ) -> None:
         self.name = name
         self.tasks = tasks_of(mission, name)
@@ -79,6 +83,7 @@ class Member:
         self._every_step = every_step
         self._decided = decided
         self._rescheduled = rescheduled
+        self._sensed = sensed
         self._period = mission.control_period
         self._mind: Mind | None = None
         self.stopped_at = 0.0
@@ -185,6 +190,8 @@ class Member:
         felt = sense.applicable, sense.complete
         if self._told.get(task) != felt:
             self._told[task] = felt
+            if self._sensed is not None:
+                self._sensed(now, self.name, task, *felt)
             self.mind.handle(translate.sensed(task, *felt), now)
             for link in self.hears:
                 link.forget()

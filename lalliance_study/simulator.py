@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from lalliance_agents.agent import translate
 from lalliance_agents.bus.base import LEASE
@@ -54,6 +54,16 @@ class Line(NamedTuple):
         return f"{self.at:.6f} {self.who} {self.what}{f' {self.task}' if self.task else ''}: {self.why}{other}"
 
 
+class Watcher(Protocol):
+    """Whoever wants to know more of a run than its log tells."""
+
+    def sensed(self, at: float, robot: str, task: str, applicable: bool, complete: bool) -> None:
+        """A robot senses that a task stands otherwise than it knew."""
+
+    def decided(self, robot: str, decision: Decision) -> None:
+        """A robot has decided something, with all that is behind it."""
+
+
 class Simulator:
     """Runs one mission.
 
@@ -62,13 +72,22 @@ class Simulator:
         timing: the delays of a real run.
         every_step: make every control step and take in every message, as a real run does, instead of only those in which
             something may happen. The result is the same, and comes later.
+        watcher: told what robots sense and decide, as they do.
     """
 
-    def __init__(self, mission: Mission, *, timing: Timing | None = None, every_step: bool = False) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        *,
+        timing: Timing | None = None,
+        every_step: bool = False,
+        watcher: Watcher | None = None,
+    ) -> None:
         self.mission = mission
         self.now = 0.0
         self.log: list[Line] = []
         self._timing = timing or Timing()
+        self._watcher = watcher
         self._heap: list[tuple[float, int, int, Callable[..., None], tuple[Any, ...]]] = []
         self._serial = 0
         self.world = World(mission, 0.0, self._tell)
@@ -80,6 +99,7 @@ class Simulator:
                 every_step=every_step,
                 decided=self._decided,
                 rescheduled=self._reschedule,
+                sensed=None if watcher is None else watcher.sensed,
             )
             for name in mission.robots
         }
@@ -146,6 +166,10 @@ class Simulator:
         who = happening.robot or "world"
         self.log.append(Line(self.now, who, happening.kind, happening.task, happening.text, None))
 
+    def _note(self, robot: str, why: str) -> None:
+        """Log what became of a robot's process."""
+        self.log.append(Line(self.now, robot, "process", None, why, None))
+
     def _reach_launcher(self) -> None:
         self.world.launcher(True, self.now)
 
@@ -155,6 +179,7 @@ class Simulator:
         member = self.members[name]
         if member.process is Process.GONE:
             member.start(self.now)
+            self._note(name, "started")
             self._soon(self._see, name, True)
 
     def _see(self, name: str, present: bool) -> None:
@@ -179,6 +204,7 @@ class Simulator:
         match order.deed:
             case Deed.KILL:
                 member.kill()
+                self._note(order.robot, "killed")
                 self._soon(self._see, order.robot, False)
             case Deed.START:
                 if member.process is not Process.GONE:
@@ -186,8 +212,10 @@ class Simulator:
                 self._at(self.now + self._timing.start_up, 0, self._start, order.robot)
             case Deed.HANG:
                 member.stop(self.now)
+                self._note(order.robot, "stopped")
                 self._at(self.now + LEASE, 0, self._lapse, order.robot, member.incarnation, self.now)
             case Deed.RESUME:
+                self._note(order.robot, "continued")
                 if member.resume(self.now):
                     self._late.add(order.robot)
                     self._soon(self._see_again, order.robot)
@@ -216,6 +244,8 @@ class Simulator:
         self.log.append(
             Line(self.now, member.name, decision.verb.value, decision.task, decision.cause.value, decision.other)
         )
+        if self._watcher is not None:
+            self._watcher.decided(member.name, decision)
         self._seq += 1
         made = DecisionMade.model_construct(
             sender=member.name,
