@@ -203,19 +203,22 @@ class Simulator:
         member = self.members[order.robot]
         match order.deed:
             case Deed.KILL:
+                if member.process is not Process.GONE:
+                    self._note(order.robot, "killed")
                 member.kill()
-                self._note(order.robot, "killed")
                 self._soon(self._see, order.robot, False)
             case Deed.START:
                 if member.process is not Process.GONE:
                     return
                 self._at(self.now + self._timing.start_up, 0, self._start, order.robot)
             case Deed.HANG:
+                if member.runs:
+                    self._note(order.robot, "stopped")
                 member.stop(self.now)
-                self._note(order.robot, "stopped")
                 self._at(self.now + LEASE, 0, self._lapse, order.robot, member.incarnation, self.now)
             case Deed.RESUME:
-                self._note(order.robot, "continued")
+                if member.process is Process.STOPPED:
+                    self._note(order.robot, "continued")
                 if member.resume(self.now):
                     self._late.add(order.robot)
                     self._soon(self._see_again, order.robot)
