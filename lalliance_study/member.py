@@ -131,6 +131,8 @@ class Member:
         if self.runs:
             self.process = Process.STOPPED
             self.stopped_at = now
+            # The steps before were made, if only in effect.
+            self.mind.rest(self._instant(self._step_from(now) - 1))
             self._schedule()
 
     def resume(self, now: float) -> bool:
@@ -146,6 +148,8 @@ class Member:
         self._step = max(math.ceil((now - self._first) / self._period - SLACK), self._step)
         self._after_pause = True
         self._wake_step = self._step
+        self._lapse_step = max(self._lapse_step, self._step)
+        self._beat_step = max(self._beat_step, self._step)
         if not lost:
             self._listen(now)
         self._schedule()
