@@ -147,7 +147,7 @@ def _with_raw(document: dict[Any, Any], draw: Random) -> bytes:
 def _head(draw: Random) -> bytes:
     """A head that claims a length: huge, or such that it might just fit."""
     head, size = draw.choice(HEADS)
-    length = draw.choice([256**size - 1, 256**size // 2, 17, draw.randrange(256)])
+    length = draw.choice([(1 << 8 * size) - 1, 1 << 8 * size - 1, 17, draw.randrange(256)])
     return head + length.to_bytes(size)
 
 
