@@ -123,7 +123,7 @@ class Keys:
                 names = _match(shape, chunks)
                 if names is not None:
                     return Key(kind, **names)
-        raise MessageError("key", f"{key[:80]!r} is not a key of this mission")
+        raise MessageError("key", f"{repr(key[:80])[:80]} is not a key of this mission")
 
 
 def _match(shape: tuple[str, ...], chunks: list[str]) -> dict[str, str] | None:
