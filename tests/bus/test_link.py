@@ -70,7 +70,7 @@ def test_the_verdicts_of_one_seed_are_these_for_ever() -> None:
     both = [
         rule("loss", ["left", "r?"], ["right"], loss=0.2, delay="uniform", delay_by=0.1, delay_to=0.3),
         rule("bursts", ["*"], ["right"], burst_loss=0.9, burst_enter=0.2, burst_leave=0.4),
-        rule("rest", ["*"], ["right"], duplicate=0.2, reorder=0.3, held=0.5),
+        rule("rest", ["*"], ["right"], duplicate=0.4, reorder=0.3, held=0.5),
     ]
     made = LinkRules(7, both)
     log = []
@@ -82,10 +82,10 @@ def test_the_verdicts_of_one_seed_are_these_for_ever() -> None:
             what = " ".join(f"{delay:.6f}" for delay in delays) or "lost"
             log.append(f"{sender} {seq}: {what} {','.join(faults)}".rstrip())
     assert log == [
-        "left 1: 0.109102 loss",
+        "left 1: 0.109102 0.254765 loss,rest",
         "left 2: lost loss",
-        "left 3: 0.202429 loss",
-        "left 4: 0.192050 loss",
+        "left 3: 0.202429 0.159974 loss,rest",
+        "left 4: 0.192050 0.268566 loss,rest",
         "left 5: 0.104376 loss",
         "left 6: lost loss",
         "left 7: 0.160287 loss",
@@ -93,9 +93,9 @@ def test_the_verdicts_of_one_seed_are_these_for_ever() -> None:
         "left 9: 0.130765 loss",
         "left 10: lost loss",
         "third 1: 0.000000",
-        "third 2: 0.000000",
-        "third 3: 0.000000",
-        "third 4: 0.000000",
+        "third 2: 0.000000 0.000000 rest",
+        "third 3: 0.000000 0.000000 rest",
+        "third 4: 0.000000 0.000000 rest",
         "third 5: 0.500000 0.500000 rest",
         "third 6: lost bursts",
         "third 7: lost bursts",
