@@ -3,7 +3,7 @@
 A `Robot` puts a mind, a messenger and a body together in one event loop. Messages become events; once per control period
 the mind ticks, and its commands go to the radio and the body. Once a second the robot refreshes what others keep of it. It
 decides nothing itself, and nothing that it receives can end it: it ends when the world says that the mission is over, or
-when it is cancelled.
+when it is cancelled. It hears through the faults of links that the world has put in force.
 """
 
 import asyncio
@@ -19,6 +19,7 @@ from lalliance_agents.agent.performer import Performer
 from lalliance_agents.agent.reports import Reports
 from lalliance_agents.agent.team import Team
 from lalliance_agents.bus.base import Bus, Delivery, Publication, Registration, Sample
+from lalliance_agents.bus.faulty import FaultyBus
 from lalliance_agents.bus.messenger import Messenger, Receiver
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
@@ -81,7 +82,6 @@ class Robot:
         self.name = name
         self._mission = mission
         self._world = world
-        self._bus = bus
         self._clock = clock or MissionClock()
         self._catalog = catalog
         if incarnation is None:
@@ -93,8 +93,9 @@ class Robot:
         self.mind = Mind(name, tasks, mission.parameters_of(name), now=now, draw=self._random.random)
         self._restore()
         self._keys = Keys(mission.name)
-        self._messenger = Messenger(bus, self._keys, name, incarnation, self._clock.now)
-        self._reports = Reports(self._messenger)
+        self._bus = FaultyBus(bus, self._keys, name, self._clock)
+        self._messenger = Messenger(self._bus, self._keys, name, incarnation, self._clock.now)
+        self._reports = Reports(self._messenger, self._bus)
         self._team = Team(name, frozenset(tasks), MOST_TEAMMATES)
         for teammate in mission.teammates(name):
             self._team.meet(teammate, frozenset(mission.robots[teammate].tasks))
@@ -136,6 +137,8 @@ class Robot:
 
     async def _join(self) -> None:
         keys, listen = self._keys, self._messenger.listen
+        if self._world:  # before the first message comes to which a rule applies
+            await self._bus.obey(timeout=GREETING_TIMEOUT)
         for task in self._repertoire:
             await listen(keys.build(Kind.ACTIVITY, task=task), self._receive_presence)
         for teammate in self._team.abilities:
@@ -172,6 +175,7 @@ class Robot:
         # The last report goes out first: who waits for it need not wait for a body that cleans up slowly.
         self._reports.send(self.mind, self._clock.now(), final=True)
         await self._messenger.close()
+        await self._bus.forget()
         if ending:
             await asyncio.wait(ending)
         await self._performer.close()
