@@ -102,27 +102,33 @@ def _holds(rule: LinkRule, sender: str, receiver: str) -> bool:
 class RuledLink:
     """The rules on the messages of one sender to one receiver."""
 
-    __slots__ = ("_cut", "_delay", "_duplicate", "_key", "_known", "_loss", "_name", "_reorder")
+    __slots__ = ("_cuts", "_delay", "_duplicate", "_key", "_known", "_loss", "_name", "_reorder")
 
     def __init__(self, seed: int, sender: str, receiver: str, rules: Sequence[LinkRule]) -> None:
         digest = blake2b(f"{seed}/{sender}/{receiver}".encode(), digest_size=8).digest()
         self._name = f"{sender} to {receiver}"
         self._key = int.from_bytes(digest, "little")
         self._known = NOTHING_KNOWN
-        self._cut = next((rule for rule in rules if rule.cut), None)
+        self._cuts = tuple(dict.fromkeys(rule.fault for rule in rules if rule.cut))
         self._loss = next((rule for rule in rules if rule.loss > 0 or rule.burst_enter > 0), None)
         self._delay = next((rule for rule in rules if rule.delay != "none"), None)
         self._duplicate = next((rule for rule in rules if rule.duplicate > 0), None)
         self._reorder = next((rule for rule in rules if rule.reorder > 0), None)
 
     def __repr__(self) -> str:
-        kinds = ("cut", "loss", "delay", "duplicate", "reorder")
-        return f"<link from {self._name}: {', '.join(kind for kind in kinds if getattr(self, '_' + kind) is not None)}>"
+        rules = {
+            "cut": self._cuts,
+            "loss": self._loss,
+            "delay": self._delay,
+            "duplicate": self._duplicate,
+            "reorder": self._reorder,
+        }
+        return f"<link from {self._name}: {', '.join(name for name, rule in rules.items() if rule)}>"
 
     def verdict(self, incarnation: int, seq: int) -> Verdict:
         """What happens to the message `seq` that the sender sent in its life `incarnation`."""
-        if self._cut is not None:
-            return Verdict((), (self._cut.fault,))
+        if self._cuts:
+            return Verdict((), self._cuts)
         key = _mixed(self._key + 0x9E3779B97F4A7C15 * incarnation)
         if self._loss is not None and self._is_lost(self._loss, key, seq):
             return Verdict((), (self._loss.fault,))
