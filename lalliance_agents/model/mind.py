@@ -85,6 +85,9 @@ class Mind:
         self._broadcast_due = now
         self._pending: list[Command] = []
         self._many = parameters.is_literal(Erratum.ONE_ACTIVE)
+        # Where motivation 0 is below the threshold, a set that is suppressed is 0 whatever else speaks for or against it.
+        self._suppresses = not (self._many or equations.reaches(0.0, parameters.threshold))
+        self._moment: Moment | None = None
         self._beats = not parameters.is_literal(Erratum.IDLE_HEARTBEAT)
         self._collisions = not parameters.is_literal(Erratum.COLLISION)
         self._bored_at_work = parameters.is_literal(Erratum.BOREDOM_AT_WORK) and len(self._sets) == 1
@@ -113,8 +116,12 @@ class Mind:
         return [task for task, one in self._sets.items() if one.active_since is not None]
 
     def factors(self) -> dict[str, Factors]:
-        """What produced each motivation at the last tick."""
-        return {task: one.factors for task, one in self._sets.items() if one.factors is not None}
+        """What produced each motivation at the last tick; of sets that another one suppressed, looked up only now."""
+        if self._moment is None:
+            return {}
+        return {
+            task: one.factors or self._appraise(one, self._moment, suppressed=True) for task, one in self._sets.items()
+        }
 
     def handle(self, event: Event, now: float) -> None:
         """Take in what was perceived at `now`; what follows from it is decided at the next tick.
@@ -167,8 +174,12 @@ class Mind:
             monitor.settle(now)
         commands, self._pending = self._pending, []
         working = self.active
-        moment = self._moment(now, before, working)
+        moment = self._moment = self._moment_at(now, before, working)
+        busy = bool(working) and self._suppresses
         for one in self._sets.values():
+            if busy and one.active_since is None:
+                one.suppress(now)
+                continue
             suppressed = bool(working) and working != [one.task]
             factors = self._appraise(one, moment, suppressed=suppressed)
             if one.active_since is not None:
@@ -202,7 +213,8 @@ class Mind:
             rate, threshold = self._boredom_rate, self.parameters.boredom_threshold
             if not equations.reaches(equations.boredom(rate, now - self._idle_since), threshold):
                 changes.append(equations.ramp_reaches(0.0, self._idle_since, rate, threshold))
-        changes += [self._outlook.next_change(one, now) for one in self._sets.values()]
+        working = self.active if self._suppresses else []
+        changes += [self._outlook.next_change(self._sets[task], now) for task in working or self._sets]
         return min(changes, default=math.inf)
 
     def next_lapse(self) -> float:
@@ -216,7 +228,7 @@ class Mind:
         """The steps up to and including `until`, at which nothing was to be done, were left out; none is undone."""
         self._before = max(self._before, until)
 
-    def _moment(self, now: float, before: float, working: list[str]) -> Moment:
+    def _moment_at(self, now: float, before: float, working: list[str]) -> Moment:
         if self._waiting and self._roster_heard(now):
             self._waiting = False
             self._idle_since = before

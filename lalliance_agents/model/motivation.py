@@ -69,6 +69,11 @@ class Motivation:
         """Stay at `value`."""
         self.base, self.since, self.rate = value, now, 0.0
 
+    def suppress(self, now: float) -> None:
+        """Be 0 because another set is active; of the other factors nothing is known."""
+        self.hold(0.0, now)
+        self.factors = None
+
     def activate(self, now: float, expected: float) -> None:
         """Become the robot's active set; the value is kept while it is."""
         self.active_since = now
