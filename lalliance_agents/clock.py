@@ -5,6 +5,7 @@ time; then all its lengths shrink alike, on every machine, and only this file kn
 """
 
 import asyncio
+from collections.abc import Callable
 
 
 class MissionClock:
@@ -26,6 +27,10 @@ class MissionClock:
     async def sleep_until(self, instant: float) -> None:
         """Wait until mission time `instant`; an instant that has passed still lets other tasks run."""
         await asyncio.sleep(max(self._real(instant) - self._loop.time(), 0.0))
+
+    def call_at(self, instant: float, callback: Callable[[], None]) -> asyncio.TimerHandle:
+        """Have `callback` called in the loop at mission time `instant`, give or take the rounding of a number."""
+        return self._loop.call_at(self._real(instant), callback)
 
     def _real(self, instant: float) -> float:
         return self._born + instant / self._speed

@@ -113,17 +113,14 @@ def _stuck_elsewhere(fault: Fault, earlier: Fault) -> bool:
 
 
 def _contradiction_on_links(fault: LinkFault, earlier: LinkFault, robots: list[str]) -> str | None:
-    differing = [name for name, value in fault.aspects().items() if earlier.aspects().get(name, value) != value]
-    if "reorder" in fault.aspects() and "reorder" in earlier.aspects() and fault.held != earlier.held:
-        differing.append("held")
-    if not differing:
+    twice = [name for name in fault.aspects() if name in earlier.aspects()]
+    if not twice:
         return None
     for sender in robots:
         for receiver in robots:
             if sender != receiver and _covers(fault, sender, receiver) and _covers(earlier, sender, receiver):
                 return (
-                    f"another rule sets {differing[0]} from {sender} to {receiver} otherwise at the same time; "
-                    "expected one value"
+                    f"another rule sets {twice[0]} from {sender} to {receiver} at the same time; expected one of them"
                 )
     return None
 

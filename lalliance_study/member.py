@@ -122,6 +122,7 @@ class Member:
             self._keep(link)
             link.reset()
         self._wake_step = self._lapse_step = self._beat_step = 0
+        self._broadcast_due = now
         self._schedule()
 
     def kill(self) -> None:
@@ -136,6 +137,8 @@ class Member:
         if self.runs:
             self.process = Process.STOPPED
             self.stopped_at = now
+            # The steps before were made, if only in effect.
+            self.mind.rest(self._instant(self._step_from(now) - 1))
             self._schedule()
 
     def resume(self, now: float) -> bool:
@@ -151,6 +154,8 @@ class Member:
         self._step = max(math.ceil((now - self._first) / self._period - SLACK), self._step)
         self._after_pause = True
         self._wake_step = self._step
+        self._lapse_step = max(self._lapse_step, self._step)
+        self._beat_step = max(self._beat_step, self._step)
         if not lost:
             self._listen(now)
         self._schedule()
@@ -234,40 +239,39 @@ class Member:
             self._schedule()
 
     def _schedule(self) -> None:
-        due = math.inf
-        if self.runs:
-            due = self._instant(min(self._wake_step, self._lapse_step, self._beat_step))
+        self._next = min(self._wake_step, self._lapse_step, self._beat_step)
+        due = self._first + self._next * self._period if self.runs else math.inf
         if due != self.due:
             self.due = due
             self._rescheduled(self)
 
     def step(self) -> None:
         """Make the control step that is due."""
-        step = min(self._wake_step, self._lapse_step, self._beat_step)
-        now, mind = self._instant(step), self.mind
+        step, now, mind = self._next, self.due, self.mind
         whole = step >= self._wake_step
         if not whole and step >= self._lapse_step:
             self._step = step
             self._listen(now)
             self._lapse_step = self._step_from(mind.next_lapse())
-            whole = step >= min(self._lapse_step, self._wake_step)
+            whole = step >= self._lapse_step or step >= self._wake_step
         if whole or step >= self._beat_step:
             if not self._after_pause:
                 mind.rest(self._instant(step - 1))
             self._after_pause = False
+            self._step = step + 1
             if whole:
                 self._listen(now)
-                self._think(now, step)
+                self._think(now)
             else:
                 self.beats += 1
-                self._step = step + 1
                 self._perform(mind.beat(now), now)
-            self._beat_step = self._next_beat()
+            if mind.broadcast_due != self._broadcast_due or self._beat_step <= step:
+                self._broadcast_due = mind.broadcast_due
+                self._beat_step = self._next_beat(step + 1)
         self._schedule()
 
-    def _think(self, now: float, step: int) -> None:
+    def _think(self, now: float) -> None:
         self.steps += 1
-        self._step = step + 1
         self._perform(self.mind.tick(now), now)
         if self._every_step:
             self._wake_step = self._step
@@ -276,10 +280,11 @@ class Member:
             self._wake_step = self._step_from(self.mind.wake())
             self._lapse_step = self._step_from(self.mind.next_lapse())
 
-    def _next_beat(self) -> int:
-        """The next step at which an announcement is due, if all steps are made."""
-        step = self._step_from(self.mind.broadcast_due - self._period)
-        while not self.mind.is_broadcast_due(self._instant(step), self._instant(step - 1)):
+    def _next_beat(self, step: int) -> int:
+        """The first step from `step` on at which an announcement is due, if all steps are made."""
+        before, is_due = self._instant(step - 1), self.mind.is_broadcast_due
+        while not is_due(now := self._instant(step), before):
+            before = now
             step += 1
         return step
 

@@ -6,7 +6,7 @@ messages. Robots are kept in the order in which they were first heard, so that n
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from lalliance_agents.model.equations import in_window
@@ -32,6 +32,9 @@ class Contact:
     """When it was noticed that the teammate is not heard on the task any more."""
     noticed: bool = False
     """Whether a step has counted the first message."""
+
+
+_NOBODY: dict[str, Contact] = {}
 
 
 @dataclass(slots=True)
@@ -60,7 +63,9 @@ class Hearing:
         self._tau = silence_timeout
         self._closed = closed
         self._per_attempt = per_attempt
-        self._robots: dict[str, Presence] = {}
+        #: Where each robot heard in this trial was last heard, in the order of their first messages.
+        self.presences: dict[str, Presence] = {}
+        self._present: list[str] | None = None
         self._contacts: dict[str, dict[str, Contact]] = {}
         #: Those of the contacts that have not lapsed, and those that no step has counted yet.
         self._lasting: list[Contact] = []
@@ -68,15 +73,19 @@ class Hearing:
 
     def forget(self) -> None:
         """Begin a trial in which nobody has been heard."""
-        self._robots.clear()
+        self.presences.clear()
+        self._present = None
         self._contacts.clear()
         self._lasting.clear()
         self._news.clear()
 
     def heard(self, robot: str, now: float, task: str | None = None) -> None:
         """`robot` is there, and its message was about `task`."""
-        self._robots.setdefault(robot, Presence(now))
-        presence = self._robots[robot]
+        presence = self.presences.get(robot)
+        if presence is None or presence.absent:
+            self._present = None
+        if presence is None:
+            presence = self.presences[robot] = Presence(now)
         presence.last, presence.task, presence.contact, presence.absent = now, task, None, False
 
     def heard_on(self, robot: str, task: str, now: float, *, active_for: float, expected: float, fresh: bool) -> None:
@@ -99,32 +108,33 @@ class Hearing:
             self._lasting.append(contact)
         contact.last = now
         contact.expected = expected
-        self._robots[robot].contact = contact
-
-    def presence(self, robot: str) -> Presence | None:
-        """Where `robot` was last heard; None if it was not heard in this trial."""
-        return self._robots.get(robot)
+        self.presences[robot].contact = contact
 
     def has_heard(self, robots: frozenset[str]) -> bool:
         """Whether each of `robots` was heard in this trial."""
-        return robots <= self._robots.keys()
+        return robots <= self.presences.keys()
 
     def is_present(self, robot: str, now: float) -> bool:
         """Whether `robot` was heard within tau, about anything."""
-        presence = self._robots.get(robot)
+        presence = self.presences.get(robot)
         return presence is not None and in_window(presence.last, now - self._tau, now, self._closed)
 
     def robots_present(self, now: float) -> list[str]:
         """The teammates heard within tau; the robot itself is not among them (erratum 3 adds it)."""
-        return [robot for robot in self._robots if self.is_present(robot, now)]
+        return [robot for robot in self.presences if self.is_present(robot, now)]
 
     def silences(self, now: float) -> dict[str, float]:
         """How long ago each teammate was last heard, in seconds."""
-        return {robot: max(now - presence.last, 0.0) for robot, presence in self._robots.items()}
+        return {robot: max(now - presence.last, 0.0) for robot, presence in self.presences.items()}
 
-    def contacts(self, task: str) -> Iterator[Contact]:
+    def contacts(self, task: str) -> Collection[Contact]:
         """All teammates heard on `task` in this trial."""
-        return iter(self._contacts.get(task, {}).values())
+        return self._contacts.get(task, _NOBODY).values()
+
+    def on_task(self, task: str, now: float) -> list[Contact]:
+        """The teammates heard on `task` within tau."""
+        contacts = self.contacts(task)
+        return [contact for contact in contacts if self.is_on(contact, now)] if contacts else []
 
     def is_on(self, contact: Contact, now: float) -> bool:
         """comm_received(i, k, j, t - tau, t)."""
@@ -132,7 +142,7 @@ class Hearing:
 
     def anybody_on(self, task: str, now: float) -> bool:
         """Whether any teammate was heard on `task` within tau."""
-        return any(self.is_on(contact, now) for contact in self.contacts(task))
+        return bool(self.on_task(task, now))
 
     def heard_until(self, contact: Contact, instant: float) -> bool:
         """comm_received(i, k, j, 0, instant)."""
@@ -147,6 +157,12 @@ class Hearing:
         if self._closed:
             return not contact.noticed
         return in_window(self.beginning(contact), before, now, closed=False)
+
+    def any_news(self, task: str, before: float, now: float) -> bool:
+        """Whether any teammate was first heard on `task` since the last communication check."""
+        if self._closed and not self._news:
+            return False
+        return any(self.is_news(contact, before, now) for contact in self.contacts(task))
 
     def note_checked(self) -> bool:
         """All that was heard so far has been counted: it is no news to the next step. Whether there was any news."""
@@ -163,7 +179,10 @@ class Hearing:
 
     def note_lapses(self, now: float) -> None:
         """Remember who has ceased to be heard, and the instant at which each teammate ceases to be heard on a task."""
-        for robot, presence in self._robots.items():
+        if self._closed and now < self.next_lapse():
+            return
+        self._present = None
+        for robot, presence in self.presences.items():
             presence.absent = not self.is_present(robot, now)
         for contact in self._lasting:
             if not self.is_on(contact, now):
@@ -173,9 +192,16 @@ class Hearing:
     def next_lapse(self) -> float:
         """The earliest instant at which a step may find that somebody has ceased to be heard, there or on a task."""
         last = math.inf
-        for presence in self._robots.values():
+        for presence in self.presences.values():
             if presence.last < last and not presence.absent:
                 last = presence.last
         for contact in self._lasting:
-            last = min(last, contact.last)
+            if contact.last < last:  # noqa: PLR1730 - this is asked for at every step, and `min` costs thrice as much
+                last = contact.last
         return last + self._tau - EARLY
+
+    def present(self, now: float) -> list[str]:
+        """`robots_present` after `note_lapses` of the same instant: the same list, until somebody comes or goes."""
+        if self._present is None or not self._closed:
+            self._present = self.robots_present(now)
+        return self._present

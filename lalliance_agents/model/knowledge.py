@@ -29,16 +29,22 @@ class Knowledge:
         self._undefined_if_unknown = parameters.is_literal(Erratum.UNKNOWN_TIMES)
         self._self_counts = not parameters.is_literal(Erratum.SELF_PRESENCE)
         self.monitors = {task: Monitor(me, parameters) for task in tasks}
+        #: Grows with each change of what is known.
+        self.version = 0
         self._seen = -1
         self._low = self._high = math.nan
         self._fallback = parameters.initial_task_time
         self._knows_teammates = False
+        for monitor in self.monitors.values():
+            monitor.on_change = self._changed
+
+    def _changed(self) -> None:
+        self.version += 1
 
     def _read(self) -> None:
-        seen = sum(monitor.version for monitor in self.monitors.values())
-        if seen == self._seen:
+        if self.version == self._seen:
             return
-        self._seen = seen
+        self._seen = self.version
         known = [(robot, time) for monitor in self.monitors.values() for robot, time in monitor.times()]
         measured = [time for monitor in self.monitors.values() for time in monitor.measured()]
         self._fallback = max(measured, default=self._parameters.initial_task_time)

@@ -30,12 +30,12 @@ from lalliance_agents.model.events import (
     Pace,
     RosterKnown,
     Sensed,
-    Teammate,
     TrialStarted,
     Verb,
 )
 from lalliance_agents.model.hearing import Hearing
 from lalliance_agents.model.knowledge import Knowledge
+from lalliance_agents.model.listening import Listener
 from lalliance_agents.model.motivation import Motivation
 from lalliance_agents.model.outlook import AT_ONCE, Outlook
 from lalliance_agents.model.parameters import EARLY, SLACK, Architecture, Erratum, Learning, Parameters
@@ -76,11 +76,18 @@ class Mind:
         self._appraisal = Appraisal(parameters, self.knowledge, self.hearing)
         self._draw = draw
         self._sets = {task: Motivation(task, 0.0) for task in tasks}
+        self._listener = Listener(me, self._sets, self.hearing, self.knowledge)
+        self._learns = parameters.architecture is Architecture.L_ALLIANCE
+        self._boredom_rate = parameters.effective_boredom_rate
+        self._broadcast_period = parameters.broadcast_period
         self._roster: frozenset[str] | None = None
         self._before = now
         self._broadcast_due = now
         self._pending: list[Command] = []
         self._many = parameters.is_literal(Erratum.ONE_ACTIVE)
+        # Where motivation 0 is below the threshold, a set that is suppressed is 0 whatever else speaks for or against it.
+        self._suppresses = not (self._many or equations.reaches(0.0, parameters.threshold))
+        self._moment: Moment | None = None
         self._beats = not parameters.is_literal(Erratum.IDLE_HEARTBEAT)
         self._collisions = not parameters.is_literal(Erratum.COLLISION)
         self._bored_at_work = parameters.is_literal(Erratum.BOREDOM_AT_WORK) and len(self._sets) == 1
@@ -106,11 +113,15 @@ class Mind:
     @property
     def active(self) -> list[str]:
         """The tasks whose sets are active: at most one, unless erratum 5 is read literally."""
-        return [task for task, one in self._sets.items() if one.active]
+        return [task for task, one in self._sets.items() if one.active_since is not None]
 
     def factors(self) -> dict[str, Factors]:
-        """What produced each motivation at the last tick."""
-        return {task: one.factors for task, one in self._sets.items() if one.factors is not None}
+        """What produced each motivation at the last tick; of sets that another one suppressed, looked up only now."""
+        if self._moment is None:
+            return {}
+        return {
+            task: one.factors or self._appraise(one, self._moment, suppressed=True) for task, one in self._sets.items()
+        }
 
     def handle(self, event: Event, now: float) -> None:
         """Take in what was perceived at `now`; what follows from it is decided at the next tick.
@@ -119,7 +130,8 @@ class Mind:
         """
         match event:
             case Heard():
-                self._hear(event, now)
+                if self._listener.hear(event, now):
+                    self._wake = AT_ONCE
                 return
             case Sensed() if event.task in self._sets:
                 self._sense(event, self._sets[event.task], now)
@@ -144,40 +156,7 @@ class Mind:
         of a run alone, with the instant of its arrival, leaves the mind as if all had been handed in: provided it is done
         before any tick, before any other event (which ends the run), and before `next_lapse` is believed.
         """
-        task = event.task if event.task in self._sets else None
-        presence = self.hearing.presence(event.robot)
-        if presence is None or presence.absent or presence.task != task:
-            return False
-        if task is None:
-            return True
-        contact = presence.contact
-        if contact is None or contact.expected != event.expected:
-            return False
-        if not 0.0 <= event.active_for < math.inf:
-            return False
-        if self._sets[task].sensory_feedback == 0:
-            return True  # no attempt is watched at a task that cannot be worked on
-        return self.knowledge.monitors[task].goes_on(event.robot, now, event.active_for)
-
-    def _hear(self, event: Heard, now: float) -> None:
-        if event.robot == self.me:
-            return
-        if not self.is_refresh(event, now):
-            self._wake = AT_ONCE
-        self.hearing.heard(event.robot, now, event.task if event.task in self._sets else None)
-        for task, monitor in self.knowledge.monitors.items():
-            if task != event.task:
-                monitor.elsewhere(event.robot, now)
-        if event.task is None or event.task not in self._sets:
-            return
-        if not 0.0 <= event.active_for < math.inf:
-            return  # no attempt can be so long; the teammate is there, and nothing more is known
-        workable = self._sets[event.task].sensory_feedback == 1
-        monitor = self.knowledge.monitors[event.task]
-        fresh = workable and monitor.observe(event.robot, now, event.active_for)
-        self.hearing.heard_on(
-            event.robot, event.task, now, active_for=event.active_for, expected=event.expected, fresh=fresh
-        )
+        return self._listener.is_refresh(event, now)
 
     def _sense(self, event: Sensed, one: Motivation, now: float) -> None:
         monitor = self.knowledge.monitors[event.task]
@@ -195,12 +174,16 @@ class Mind:
             monitor.settle(now)
         commands, self._pending = self._pending, []
         working = self.active
-        moment = self._moment(now, before, working)
+        moment = self._moment = self._moment_at(now, before, working)
+        busy = bool(working) and self._suppresses
         for one in self._sets.values():
-            suppressed = any(task != one.task for task in working)
+            if busy and one.active_since is None:
+                one.suppress(now)
+                continue
+            suppressed = bool(working) and working != [one.task]
             factors = self._appraise(one, moment, suppressed=suppressed)
-            if one.active:
-                one.factors = factors._replace(motivation=one.value(now))
+            if one.active_since is not None:
+                one.factors = factors.having(one.value(now))
                 commands += self._continue(one, now)
             else:
                 self._grow(one, factors, moment)
@@ -227,10 +210,11 @@ class Mind:
         if self._waiting:
             changes.append(self._born + self.parameters.silence_timeout)
         elif not self.active:
-            rate, threshold = self.parameters.effective_boredom_rate, self.parameters.boredom_threshold
+            rate, threshold = self._boredom_rate, self.parameters.boredom_threshold
             if not equations.reaches(equations.boredom(rate, now - self._idle_since), threshold):
                 changes.append(equations.ramp_reaches(0.0, self._idle_since, rate, threshold))
-        changes += [self._outlook.next_change(one, now) for one in self._sets.values()]
+        working = self.active if self._suppresses else []
+        changes += [self._outlook.next_change(self._sets[task], now) for task in working or self._sets]
         return min(changes, default=math.inf)
 
     def next_lapse(self) -> float:
@@ -244,14 +228,14 @@ class Mind:
         """The steps up to and including `until`, at which nothing was to be done, were left out; none is undone."""
         self._before = max(self._before, until)
 
-    def _moment(self, now: float, before: float, working: list[str]) -> Moment:
+    def _moment_at(self, now: float, before: float, working: list[str]) -> Moment:
         if self._waiting and self._roster_heard(now):
             self._waiting = False
             self._idle_since = before
         idle = self._bored_at_work or not working
         idle_for = now - self._idle_since if idle and not self._waiting else 0.0
-        bored = equations.boredom(self.parameters.effective_boredom_rate, idle_for)
-        return Moment(now, before, self.hearing.robots_present(now), bored, self._waiting)
+        bored = equations.boredom(self._boredom_rate, idle_for)
+        return Moment(now, before, self.hearing.present(now), bored, self._waiting)
 
     def _roster_heard(self, now: float) -> bool:
         """Erratum 4: the roster was heard, or one tau has passed."""
@@ -260,27 +244,28 @@ class Mind:
         return equations.reaches(now - self._born, self.parameters.silence_timeout)
 
     def _appraise(self, one: Motivation, moment: Moment, *, suppressed: bool) -> Factors:
-        if self._learning is Learning.ACTIVE and self.parameters.architecture is Architecture.L_ALLIANCE:
+        if self._learns and self._learning is Learning.ACTIVE:
             return self._appraisal.learning(one, moment, suppressed=suppressed)
         return self._appraisal.adaptive(one, moment, suppressed=suppressed)
 
     def _grow(self, one: Motivation, factors: Factors, moment: Moment) -> None:
         """m_ij(t) of a set that is not active."""
-        gates = (
+        one.grow(0.0 if moment.waiting else factors.rate, moment.before)
+        increment = one.rate * (moment.now - one.since)
+        if factors.pace is Pace.RANDOM and factors.is_open:
+            increment = self.parameters.threshold * self._draw()
+        value = equations.motivation(
+            one.base,
+            increment,
             factors.sensory_feedback,
             factors.activity_suppression,
             factors.impatience_reset,
             factors.acquiescence,
             factors.learned_robot_influence,
         )
-        one.grow(0.0 if moment.waiting else factors.rate, moment.before)
-        increment = one.rate * (moment.now - one.since)
-        if factors.pace is Pace.RANDOM and all(gates):
-            increment = self.parameters.threshold * self._draw()
-        value = equations.motivation(one.base, increment, *gates)
         if value <= 0.0 or factors.pace is Pace.RANDOM:
             one.hold(value, moment.now)
-        one.factors = factors._replace(motivation=value)
+        one.factors = factors if value == 0.0 else factors.having(value)
 
     def _continue(self, one: Motivation, now: float) -> list[Command]:
         """Let the active set go on, or stop it."""
@@ -291,9 +276,11 @@ class Mind:
         factors = one.factors
         assert factors is not None  # noqa: S101 - set by `tick` just before
         rival = self._appraisal.rival(one, self.me, now) if self._collisions else None
-        contender = next((mate.robot for mate in self._contenders(one, now)), None)
+        contender = self._appraisal.contender(one.task)
         # Acquiescence with no limit to an attempt is 0 only because of the contender.
         yields = equations.acquiescence(one.active_for(now), factors.psi, contender is not None, math.inf) == 0
+        if factors.is_open and not (one.complete or one.body_failed or yields or rival is not None):
+            return None, None
         reasons: list[tuple[bool, Cause, str | None]] = [
             (one.complete, Cause.SENSED, None),
             (factors.sensory_feedback == 0, Cause.INAPPLICABLE, None),
@@ -307,15 +294,12 @@ class Mind:
         ]
         return next(((cause, other) for holds, cause, other in reasons if holds), (None, None))
 
-    def _contenders(self, one: Motivation, now: float) -> list[Teammate]:
-        return [mate for mate in self._appraisal.teammates(one.task, now) if mate.lapsed_at is None]
-
     def _stop(self, one: Motivation, now: float, cause: Cause, other: str | None) -> Decision:
         decision = self._decision(one, now, _VERBS.get(cause, Verb.DROP), cause, other)
         if cause is not Cause.SENSED:
             self.knowledge.monitors[one.task].ceased(now, failed=cause not in _BLAMELESS)
         one.deactivate(now)
-        one.factors = decision.factors._replace(motivation=0.0)
+        one.factors = decision.factors.having(0.0)
         if not self._bored_at_work:
             self._idle_since = now
         return decision
@@ -329,9 +313,13 @@ class Mind:
     def _activate(self, now: float) -> list[Command]:
         """Erratum 5: incumbent first, then the highest motivation, then the lowest task index."""
         theta = self.parameters.threshold
-        ready = [one for one in self._sets.values() if not one.active and equations.reaches(one.value(now), theta)]
+        if not self._many and self.active:
+            return []
+        ready = [
+            one for one in self._sets.values() if one.active_since is None and equations.reaches(one.value(now), theta)
+        ]
         if not self._many:
-            if not ready or self.active:
+            if not ready:
                 return []
             highest = max(one.value(now) for one in ready)
             ready = [next(one for one in ready if one.value(now) >= highest - SLACK)]
@@ -376,7 +364,7 @@ class Mind:
         """Broadcast at rate rho, by the tick nearest to the instant due, and at once on activation."""
         if not urgent and not self.is_broadcast_due(now, before):
             return []
-        period = self.parameters.broadcast_period
+        period = self._broadcast_period
         kept = self._broadcast_due + period
         self._broadcast_due = kept if not urgent and kept > now else now + period
         working = self.active

@@ -12,7 +12,7 @@ may still be working and is not judged before the task is complete or the teamma
 
 import math
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -32,7 +32,9 @@ class Record(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Attempt:
+class Attempt:
+    """One attempt that is watched. Instants are the watching robot's own."""
+
     started: float
     last: float
     active_for: float
@@ -73,10 +75,13 @@ class Monitor:
         self._collision = parameters.effective_collision_window
         self._tau = parameters.silence_timeout
         self._performances: dict[str, _Performance] = {}
-        self._attempts: dict[str, _Attempt] = {}
+        self._attempts: dict[str, Attempt] = {}
+        self._anybody_left = False
         self._earlier = 0
         #: Grows with each change of what is known.
         self.version = 0
+        #: Told of each such change.
+        self.on_change: Callable[[], None] = lambda: None
 
     def new_trial(self) -> None:
         """Forget the attempts; keep what was learned."""
@@ -91,10 +96,10 @@ class Monitor:
             return False
         if attempt is not None:
             self._fail(robot, attempt)
-        self._attempts[robot] = _Attempt(now - active_for, now, active_for)
+        self._attempts[robot] = Attempt(now - active_for, now, active_for)
         return True
 
-    def _goes_on(self, attempt: _Attempt, now: float, active_for: float) -> bool:
+    def _goes_on(self, attempt: Attempt, now: float, active_for: float) -> bool:
         """Whether a message belongs to `attempt`: not one begun after it, and not one begun while nothing was heard."""
         begun_later = more_than(now - active_for, attempt.last + self._tau)
         return active_for >= attempt.active_for - SLACK and not begun_later
@@ -104,27 +109,34 @@ class Monitor:
         attempt = self._attempts.get(robot)
         if attempt is not None and attempt.left is None:
             attempt.left = now
+            self._anybody_left = True
 
     def settle(self, now: float) -> None:
         """Judge the attempts whose robots left more than tau ago: no completion can be on its way any more."""
+        if not self._anybody_left:
+            return
         for robot in [name for name, one in self._attempts.items() if one.left is not None]:
             attempt = self._attempts[robot]
             if attempt.left is not None and more_than(now - attempt.left, self._tau):
                 self._fail(robot, attempt)
+        self._anybody_left = any(one.left is not None for one in self._attempts.values())
 
     def settles_at(self) -> float:
         """The instant after which `settle` has something to judge."""
+        if not self._anybody_left:
+            return math.inf
         left = [attempt.left for attempt in self._attempts.values() if attempt.left is not None]
         return min(left, default=math.inf) + self._tau
 
-    def goes_on(self, robot: str, now: float, active_for: float) -> bool:
-        """Whether a message of `robot`, that it is on the task since `active_for` seconds, tells of the attempt known."""
+    def continued(self, robot: str, now: float, active_for: float) -> Attempt | None:
+        """The attempt that a message of `robot`, on the task since `active_for` seconds, goes on with, if there is one."""
         attempt = self._attempts.get(robot)
-        return attempt is not None and attempt.left is None and self._goes_on(attempt, now, active_for)
+        goes_on = attempt is not None and attempt.left is None and self._goes_on(attempt, now, active_for)
+        return attempt if goes_on else None
 
     def began(self, now: float) -> None:
         """The robot itself begins an attempt."""
-        self._attempts[self._me] = _Attempt(now, now, 0.0)
+        self._attempts[self._me] = Attempt(now, now, 0.0)
 
     def ceased(self, now: float, *, failed: bool) -> None:
         """The robot itself ends its attempt, and the task is not complete; it knows why, however short the attempt was."""
@@ -162,7 +174,7 @@ class Monitor:
         candidates = lasting or list(self._attempts)
         return candidates[0] if len(candidates) == 1 and self._earlier == 0 else None
 
-    def _fail(self, robot: str, attempt: _Attempt, *, failed: bool = True, short: bool = True) -> None:
+    def _fail(self, robot: str, attempt: Attempt, *, failed: bool = True, short: bool = True) -> None:
         """End an attempt without completion; a `short` one that may have ended in a collision is as if it had never been."""
         del self._attempts[robot]
         elapsed = attempt.last - attempt.started
@@ -189,6 +201,7 @@ class Monitor:
     def _changed(self, known: _Performance) -> None:
         known.refresh()
         self.version += 1
+        self.on_change()
 
     def task_time(self, robot: str) -> float | None:
         """task_time_i(k, j, t) in seconds; None while no time of `robot` is known."""
@@ -224,3 +237,4 @@ class Monitor:
         """Take what was learned in earlier missions."""
         self._performances = {robot: _Performance(self._trials, record) for robot, record in records.items()}
         self.version += 1
+        self.on_change()

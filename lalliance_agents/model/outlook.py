@@ -50,7 +50,7 @@ class Outlook:
             return AT_ONCE
         if one.active_since is not None:
             return self._end_of_attempt(one.task, one.active_since, factors, now)
-        if not _is_open(factors):
+        if not factors.is_open:
             return math.inf  # what opens a gate is an event, a silence, boredom, or a step that was not the last
         expected = 0.0 if factors.pace is Pace.WAITING else factors.rate
         if factors.pace is Pace.RANDOM or one.rate != expected:
@@ -66,13 +66,3 @@ class Outlook:
         # A time that is unknown, erratum 10 read literally, limits nothing.
         ends = [since + limit for limit in limits if not math.isnan(limit)]
         return min(*ends, math.inf, self._appraisal.patience_ends(task, now)) - SLACK
-
-
-def _is_open(factors: Factors) -> bool:
-    return (
-        factors.sensory_feedback
-        * factors.activity_suppression
-        * factors.impatience_reset
-        * factors.acquiescence
-        * factors.learned_robot_influence
-    ) == 1

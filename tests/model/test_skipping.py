@@ -1,11 +1,16 @@
 """A driver that skips every step at which nothing changes gets the same decisions and messages, to the last bit."""
 
+from math import inf
+
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from model.skipping import Driver, Scene, Skipper, World
 
+from lalliance_agents.model.events import Heard, RosterKnown, Sensed
+from lalliance_agents.model.mind import Mind
 from lalliance_agents.model.monitor import Record
+from lalliance_agents.model.outlook import AT_ONCE
 from lalliance_agents.model.parameters import (
     Architecture,
     Erratum,
@@ -111,3 +116,94 @@ def test_most_steps_are_skipped(changes: dict[str, float], share: float) -> None
     assert few.told() == every.told()
     assert sum("Activate" in line for line in every.told().splitlines()) > 4
     assert few.ticks < share * every.ticks
+
+
+# --- what a mind wants
+
+
+def mind(*tasks: str, roster: frozenset[str] = frozenset(), **changes: object) -> Mind:
+    """A mind at 0, told of its tasks and its roster, that is better at all of them than the teammate it knows."""
+    made = Mind("me", tasks, Parameters(**changes), now=0.0, draw=lambda: 0.5)  # type: ignore[arg-type]
+    made.knowledge.restore({task: {"me": Record((5.0,)), "a": Record((9.0,))} for task in tasks})
+    made.handle(RosterKnown(roster), 0.0)
+    for task in tasks:
+        made.handle(Sensed(task, applicable=True, complete=False), 0.0)
+    return made
+
+
+def settled(made: Mind, *events: Heard) -> Mind:
+    """The mind after `events` and two steps, at 0.1 and 0.2."""
+    for event in events:
+        made.handle(event, 0.0)
+    made.tick(0.1)
+    made.tick(0.2)
+    return made
+
+
+def test_a_mind_wakes_when_its_motivation_reaches_the_threshold() -> None:
+    """After a delay of 1 s since its first step, less the slack of the comparison and a little to be early."""
+    one = mind("x", ordering=Ordering.LONGEST_FIRST, min_delay=1.0)
+    assert one.wake() == AT_ONCE, "before the first tick"
+    one.tick(0.0)
+    assert one.wake() == AT_ONCE, "in a step without length nothing has grown yet"
+    one.tick(0.1)
+    assert one.wake() == pytest.approx(1.0, abs=1e-5)
+    assert 1.0 - 1e-5 < one.wake() < 1.0
+
+
+def test_a_mind_that_is_best_at_nothing_wakes_when_it_is_bored() -> None:
+    one = settled(mind("x", roster=frozenset({"a"})), Heard("a", None), Heard("b", "x", 0.0, 3.0))
+    assert one.factors()["x"].category == 2
+    assert one.wake() == pytest.approx(1.2, abs=1e-5)
+    assert one.next_lapse() == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_mind_that_waits_for_its_roster_wakes_after_tau() -> None:
+    assert settled(mind("x", roster=frozenset({"a"}))).wake() == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_mind_at_work_wakes_to_give_up_and_one_with_nothing_to_do_never() -> None:
+    one = mind("x", ordering=Ordering.LONGEST_FIRST)
+    started = next(step / 10 for step in range(20) if one.tick(step / 10) and one.active)
+    assert one.wake() == AT_ONCE
+    one.tick(started + 0.1)
+    assert one.wake() == pytest.approx(started + 10.0, abs=1e-5)
+    one.handle(Sensed("x", applicable=False, complete=True), 2.0)
+    assert one.wake() == AT_ONCE
+    for step in range(30):
+        one.tick(2.0 + step / 10)
+    assert one.wake() == one.next_lapse() == inf
+
+
+@pytest.mark.parametrize(
+    ("event", "refreshes"),
+    [
+        (Heard("a", "x", 0.5, 9.0), True),
+        (Heard("a", "x", 0.0, 9.0), True),
+        (Heard("a", "x", 0.5, 8.0), False),  # expects another time
+        (Heard("a", "x", -0.5, 9.0), False),  # nonsense
+        (Heard("a", "y", 0.5, 9.0), False),
+        (Heard("a", None), False),
+        (Heard("b", None), True),
+        (Heard("b", "z", 0.5, 9.0), True),  # on a task that this robot cannot do: as if idle
+        (Heard("b", "x", 0.5, 9.0), False),
+        (Heard("c", None), False),  # never heard before
+        (Heard("me", "x"), False),  # its own echo, which says nothing
+    ],
+)
+def test_a_refresh_only_goes_on_with_what_was_heard(event: Heard, refreshes: bool) -> None:
+    one = settled(mind("x", "y"), Heard("a", "x", 0.0, 9.0), Heard("b", None))
+    wanted = one.wake()
+    assert wanted > 0.2
+    assert one.is_refresh(event, 0.5) is refreshes
+    one.handle(event, 0.5)
+    assert one.wake() == (wanted if refreshes or event.robot == "me" else AT_ONCE)
+
+
+def test_a_message_after_a_silence_or_of_a_second_attempt_is_no_refresh() -> None:
+    one = settled(mind("x", "y"), Heard("a", "x", 0.0, 9.0), Heard("b", None))
+    one.handle(Heard("a", "x", 0.5, 9.0), 0.5)
+    assert not one.is_refresh(Heard("a", "x", 0.1, 9.0), 0.6)
+    one.tick(1.3)
+    assert not one.is_refresh(Heard("b", None), 1.4)
+    assert one.is_refresh(Heard("a", "x", 1.4, 9.0), 1.4)
