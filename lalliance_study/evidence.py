@@ -118,9 +118,9 @@ class History:
         """When the last trial that began did; infinite if none did."""
         return self.trials[-1] if self.trials else math.inf
 
-    def on(self, robot: str, at: float) -> str | None:
-        """The task that `robot` was on at an instant."""
-        return next((span.task for span in self.spans if span.robot == robot and span.since <= at < span.until), None)
+    def is_on(self, robot: str, task: str, at: float) -> bool:
+        """Whether `robot` was on `task` at an instant."""
+        return any(one.robot == robot and one.task == task and one.since <= at < one.until for one in self.spans)
 
     def idle_throughout(self, robot: str, since: float, until: float) -> bool:
         """Whether `robot` was on no task from one instant to another."""

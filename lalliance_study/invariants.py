@@ -80,7 +80,9 @@ def leaves_what_is_closed(evidence: Evidence) -> Iterator[str]:
     for note in evidence.notes:
         if isinstance(note, Sight):
             due.pop((note.robot, note.task), None)
-            if note.task in active.get(note.robot, ()) and (note.complete or not note.applicable):
+            closed = note.complete or not note.applicable
+            # A robot that was killed meanwhile has left its task without a word.
+            if closed and note.task in active.get(note.robot, ()) and evidence.history.is_on(*note[1:3], note.at):
                 due[note.robot, note.task] = note
         elif note.verb == Verb.ACTIVATE:
             active.setdefault(note.robot, set()).add(note.task)
