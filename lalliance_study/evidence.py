@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from lalliance_agents.config import Mission
 from lalliance_agents.model.events import Cause, Decision, Verb
+from lalliance_agents.model.parameters import Erratum
 from lalliance_study.simulator import Line, Simulator, Timing
 
 _CAUSES = frozenset(cause.value for cause in Cause)
@@ -109,14 +110,9 @@ class History:
     """When which robot was `killed` or `stopped`, and the task it was on."""
     completions: list[Completion] = field(default_factory=list)
     trials: list[float] = field(default_factory=list)
-    """When each trial began."""
+    """When each trial began, as told at the next step of the world."""
     broken: list[str] = field(default_factory=list)
     """What no log can say: a second active set, the end of one that was not active, a decision of a robot that is not there."""
-
-    @property
-    def live_since(self) -> float:
-        """When the last trial that began did; infinite if none did."""
-        return self.trials[-1] if self.trials else math.inf
 
     def is_on(self, robot: str, task: str, at: float) -> bool:
         """Whether `robot` was on `task` at an instant."""
@@ -199,6 +195,8 @@ class Evidence:
     log: list[Line]
     notes: list[Sight | Choice]
     summary: dict[str, Any]
+    began: float
+    """When the last trial began; the account of the world counts from there."""
     ended: float
     """When the simulation ended."""
     message_delay: float
@@ -212,7 +210,12 @@ class Evidence:
     @property
     def live_for(self) -> float:
         """How long the last trial lasted, in seconds."""
-        return self.ended - self.history.live_since
+        return self.ended - self.began
+
+    @cached_property
+    def several_sets(self) -> bool:
+        """Whether a robot may have several active sets (erratum 5, literal): what it is on is then not told by its log."""
+        return any(self.mission.parameters_of(robot).is_literal(Erratum.ONE_ACTIVE) for robot in self.mission.robots)
 
     def choices(self) -> Iterator[Choice]:
         """The decisions, in order."""
@@ -229,4 +232,5 @@ def gather(mission: Mission, *, every_step: bool = False) -> Evidence:
     witness, timing = Witness(), Timing()
     simulator = Simulator(mission, timing=timing, every_step=every_step, watcher=witness)
     summary = simulator.run()
-    return Evidence(mission, simulator.log, witness.notes, summary, simulator.now, timing.message_delay)
+    began, ended = simulator.world.began, simulator.now
+    return Evidence(mission, simulator.log, witness.notes, summary, began, ended, timing.message_delay)

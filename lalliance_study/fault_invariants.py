@@ -53,10 +53,10 @@ def is_taken_again(evidence: Evidence) -> Iterator[str]:
     hears all the time, and nobody else is on the task meanwhile.
     """
     history, mission = evidence.history, evidence.mission
-    if mission.live.learning is not Learning.ADAPTIVE:
+    if mission.live.learning is not Learning.ADAPTIVE or evidence.several_sets:
         return
     for at, victim, how, task in history.silenced:
-        if task is None or at < history.live_since:
+        if task is None or at < evidence.began:
             continue
         for robot in mission.able(task):
             until = _taken_by(evidence, robot, at)
@@ -74,7 +74,7 @@ def is_taken_again(evidence: Evidence) -> Iterator[str]:
 def _taken_by(evidence: Evidence, robot: str, at: float) -> float:
     """The instant by which `robot`, if it is free, takes what a teammate was on that fell silent at `at`."""
     own, period = evidence.mission.parameters_of(robot), evidence.mission.control_period
-    born = max([evidence.history.live_since, *(one for one in evidence.history.births.get(robot, ()) if one <= at)])
+    born = max([evidence.began, *(one for one in evidence.history.births.get(robot, ()) if one <= at)])
     begun = max(at, born + own.silence_timeout + period)
     noticed = max(at + evidence.message_delay + own.silence_timeout, begun) + period
     if own.architecture is Architecture.ALLIANCE:
@@ -98,7 +98,7 @@ def _is_free(evidence: Evidence, robot: str, task: str, at: float, until: float)
 
 def _disturbed(evidence: Evidence, robot: str, until: float) -> bool:
     """Whether a fault may have kept `robot` from sensing or hearing before `until`, or delayed what it heard."""
-    begun = evidence.history.live_since
+    begun = evidence.began
     return any(
         isinstance(fault, Blind | LinkFault | Partition | RadioFault)
         and begun + fault.at < until
@@ -126,7 +126,7 @@ def _stays_away(evidence: Evidence, victim: str, at: float, until: float) -> boo
 
 def _completed(evidence: Evidence, task: str, until: float) -> bool:
     done = evidence.summary["tasks"][task]["completed_at"]
-    return done is not None and evidence.history.live_since + done <= until
+    return done is not None and evidence.began + done <= until
 
 
 def faults_fire(evidence: Evidence) -> Iterator[str]:
@@ -138,7 +138,7 @@ def faults_fire(evidence: Evidence) -> Iterator[str]:
     - links: robots that are heard by others run for so long that the chance of all their messages being spared is `NEVER`; told
       only where no other rule is in force, since the first of two rules hides the second.
     """
-    begun = evidence.history.live_since
+    begun = evidence.began
     for fault, report in zip(evidence.mission.faults, evidence.summary["faults"], strict=True):
         since, until = begun + fault.at + LAG, min(begun + fault.end, evidence.ended) - LAG
         if not report["fired"] and since < until and _had_occasion(evidence, fault, since, until):
@@ -229,7 +229,7 @@ def _least_chance(fault: Fault) -> float:
 
 def what_fired_was_there(evidence: Evidence) -> Iterator[str]:
     """A fault that is said to have had an effect did: in its time, on a robot that was there, on a body that was working."""
-    begun, history = evidence.history.live_since, evidence.history
+    begun, history = evidence.began, evidence.history
     for fault, report in zip(evidence.mission.faults, evidence.summary["faults"], strict=True):
         if report["fired"] != (report["count"] > 0) or report["fired"] != (report["fired_at"] is not None):
             yield f"{report['name']} is told to have fired: {report['fired']}, {report['count']} times, {report['fired_at']}"

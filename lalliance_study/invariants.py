@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from lalliance_agents.model.events import Cause, Verb
-from lalliance_agents.model.parameters import SLACK, Erratum
+from lalliance_agents.model.parameters import SLACK
 from lalliance_study import fault_invariants
 from lalliance_study.accounts import attempts_are_real, credit_is_due, takeovers_are_real, totals_agree
 from lalliance_study.evidence import Evidence, Sight
@@ -38,12 +38,8 @@ def completes(evidence: Evidence) -> Iterator[str]:
 
 def one_set_at_most(evidence: Evidence) -> Iterator[str]:
     """A robot has at most one active set, ends only what is active, and decides nothing while its process does not run."""
-    many = {
-        robot for robot in evidence.mission.robots if evidence.mission.parameters_of(robot).is_literal(Erratum.ONE_ACTIVE)
-    }
-    for sentence in evidence.history.broken:
-        if sentence.split()[1] not in many:
-            yield sentence
+    if not evidence.several_sets:
+        yield from evidence.history.broken
 
 
 def own_tasks_only(evidence: Evidence) -> Iterator[str]:

@@ -202,10 +202,11 @@ class Simulator:
         if order.number in self._served:
             return
         member = self.members[order.robot]
+        if order.deed in {Deed.KILL, Deed.HANG} and member.process is Process.GONE:
+            return  # it is still starting; the order stands, and meets it as soon as it is there
         match order.deed:
             case Deed.KILL:
-                if member.process is not Process.GONE:
-                    self._note(order.robot, "killed")
+                self._note(order.robot, "killed")
                 member.kill()
                 self._soon(self._see, order.robot, False)
             case Deed.START:
