@@ -68,7 +68,7 @@ def _spans(evidence: Evidence, robot: str, task: str) -> list[Span]:
 
 def _covers(span: Span, at: float, delay: float) -> bool:
     """Whether a body may have worked at an instant, given what its mind decided."""
-    return span.since + delay - SLACK <= at <= span.until + delay + SLACK
+    return span.since - SLACK <= at <= span.until + delay + SLACK
 
 
 def _worked_enough(evidence: Evidence, task: str, opened: float, at: float, by: list[str]) -> Iterator[str]:
@@ -79,7 +79,7 @@ def _worked_enough(evidence: Evidence, task: str, opened: float, at: float, by: 
     shares = []
     for span in evidence.history.spans:
         if span.task == task:
-            worked = min(span.until + delay, at) - max(span.since + delay, opened)
+            worked = min(span.until + delay, at) - max(span.since, opened)
             if worked > 0:
                 shares.append((span.robot, worked / (mission.robots[span.robot].tasks[task] * least)))
     if options.get("hand_over") == "restart":

@@ -199,6 +199,8 @@ class Evidence:
     """When the last trial began; the account of the world counts from there."""
     ended: float
     """When the simulation ended."""
+    live: bool
+    """Whether the last trial that began is the live one, in which faults happen."""
     message_delay: float
     """Of every message before link rules, in seconds."""
 
@@ -232,5 +234,14 @@ def gather(mission: Mission, *, every_step: bool = False) -> Evidence:
     witness, timing = Witness(), Timing()
     simulator = Simulator(mission, timing=timing, every_step=every_step, watcher=witness)
     summary = simulator.run()
-    began, ended = simulator.world.began, simulator.now
-    return Evidence(mission, simulator.log, witness.notes, summary, began, ended, timing.message_delay)
+    world = simulator.world
+    return Evidence(
+        mission=mission,
+        log=simulator.log,
+        notes=witness.notes,
+        summary=summary,
+        began=world.began,
+        ended=simulator.now,
+        live=world.live,
+        message_delay=timing.message_delay,
+    )

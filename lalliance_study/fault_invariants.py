@@ -26,11 +26,14 @@ from lalliance_agents.faults import (
 from lalliance_agents.model.parameters import Architecture, Erratum, Learning
 from lalliance_study.evidence import Evidence, Sight
 from lalliance_study.promises import longest_idleness
+from lalliance_study.simulator import Timing
 from world_server.rules import link_rules
 from world_server.world import REFRESH_PERIOD, STEP
 
 #: From the instant at which something is due in the world to its effect at a robot, in seconds: a step, and messages.
 LAG = STEP + 0.02
+#: An order meets a process that is still starting when it is there, in seconds.
+START_UP = Timing().start_up
 #: A chance smaller than this does not happen.
 NEVER = 1e-9
 
@@ -141,7 +144,7 @@ def faults_fire(evidence: Evidence) -> Iterator[str]:
     begun = evidence.began
     for fault, report in zip(evidence.mission.faults, evidence.summary["faults"], strict=True):
         since, until = begun + fault.at + LAG, min(begun + fault.end, evidence.ended) - LAG
-        if not report["fired"] and since < until and _had_occasion(evidence, fault, since, until):
+        if evidence.live and not report["fired"] and since < until and _had_occasion(evidence, fault, since, until):
             yield f"{report['name']} ({describe(fault)}) never fired although it was due at {fault.at:g} s"
 
 
@@ -237,11 +240,12 @@ def what_fired_was_there(evidence: Evidence) -> Iterator[str]:
             continue
         since, until = begun + fault.at - LAG, begun + fault.end + LAG
         # Reports of links and senses come once a second, and at the end; an order may be carried out after the fault's end.
-        if not fault.at - LAG <= report["fired_at"] <= fault.end + REFRESH_PERIOD + LAG:
+        if not fault.at - LAG <= report["fired_at"] <= fault.end + REFRESH_PERIOD + START_UP + LAG:
             yield f"{report['name']} fired at {report['fired_at']:.3f} s, out of its time"
         robot = robot_of(fault)
         if isinstance(fault, Crash | Hang):
             how = "killed" if isinstance(fault, Crash) else "stopped"
+            until += START_UP
             if not any(since <= at <= until and (who, what) == (robot, how) for at, who, what, _ in history.silenced):
                 yield f"{report['name']} fired, but no running process of {robot} was {how} then"
         elif isinstance(fault, Stuck | Slow) and not any(
