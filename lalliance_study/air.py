@@ -90,7 +90,12 @@ class AirLink:
         if not verdict.delays:
             self.lost += 1
         for late in verdict.delays:
-            self._put(spoken if late == 0.0 else spoken._replace(arrives=spoken.arrives + late))
+            self._put(spoken if late == 0.0 else self._delayed(spoken, late))
+
+    def _delayed(self, spoken: Spoken, late: float) -> Spoken:
+        # What is under way for about as long as a silence that would be noticed is a thing of its own.
+        content = spoken.content if late < self.hearer.tau / 2 else object()
+        return spoken._replace(arrives=spoken.arrives + late, content=content)
 
     def _put(self, spoken: Spoken) -> None:
         arrives = spoken.arrives

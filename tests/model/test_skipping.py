@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from model.skipping import Driver, Scene, Skipper, World
 
-from lalliance_agents.model.events import Heard, RosterKnown, Sensed
+from lalliance_agents.model.events import Activate, Heard, RosterKnown, Sensed
 from lalliance_agents.model.mind import Mind
 from lalliance_agents.model.monitor import Record
 from lalliance_agents.model.outlook import AT_ONCE
@@ -42,6 +42,8 @@ PARAMETERS = st.builds(
     ordering=st.sampled_from(Ordering),
     min_delay=st.sampled_from([0.05, 0.2, 1.0]),
     broadcast_rate=st.sampled_from([3.0, 5.0, 10.0, 30.0]),
+    silence_timeout=st.sampled_from([0.7, 1.0]),
+    boredom_rate=st.sampled_from([None, 0.1]),
     threshold=st.sampled_from([0.5, 1.0, 3.0]),
     trials=st.integers(1, 3),
     initial_task_time=st.sampled_from([1.0, 5.0]),
@@ -116,6 +118,20 @@ def test_most_steps_are_skipped(changes: dict[str, float], share: float) -> None
     assert few.told() == every.told()
     assert sum("Activate" in line for line in every.told().splitlines()) > 4
     assert few.ticks < share * every.ticks
+
+
+def test_a_skipped_step_does_not_hide_that_an_idle_teammate_has_died() -> None:
+    """B, which is better at x, dies before it starts; a is not bored before 10 s, and expects to be best from then on."""
+    scene = Scene(
+        {"a": {"x": 4.0}, "b": {"x": 2.0}},
+        Parameters(min_delay=1.0, boredom_rate=0.1),
+        known={"x": {"a": Record((4.0,)), "b": Record((2.0,))}},
+        dead_after={"b": 0.55},
+    )
+    every, few = World(scene, Driver).run(HORIZON), World(scene, Skipper).run(HORIZON)
+    assert few.told() == every.told()
+    started = next(at for at, robot, what in few.log if robot == "a" and isinstance(what, Activate))
+    assert started == pytest.approx(2.5, abs=0.11)
 
 
 # --- what a mind wants
