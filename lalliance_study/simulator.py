@@ -54,6 +54,10 @@ class Line(NamedTuple):
         return f"{self.at:.6f} {self.who} {self.what}{f' {self.task}' if self.task else ''}: {self.why}{other}"
 
 
+Senses = tuple[int, str, list[tuple[str, bool, bool]]]
+"""What the world says of tasks: the trial, its way of learning, and of each task whether it is applicable, and complete."""
+
+
 class Watcher(Protocol):
     """Whoever wants to know more of a run than its log tells."""
 
@@ -110,6 +114,8 @@ class Simulator:
         self._seen: dict[str, tuple[int, bool, bool]] = {}
         self._late: set[str] = set()
         self._blind: dict[str, tuple[str, float | None]] = {}
+        #: Of robots whose senses were held back: when what they know of each task was said.
+        self._tardy: dict[str, dict[str, float]] = {}
         self._served: set[int] = set()
         self._actions: dict[str, Action] = {}
         self._reported: dict[str, int] = {}
@@ -395,24 +401,34 @@ class Simulator:
         self._seen[view[0]] = known
         return True
 
-    def _whole_view(self) -> tuple[int, str, list[tuple[str, bool, bool]]]:
+    def _whole_view(self) -> Senses:
         views = [(task, *_applies(view)) for task, view in self.world.tasks().items()]
         return self.world.trial, self.world.learning, views
 
-    def _sense(self, name: str, sensed: tuple[int, str, list[tuple[str, bool, bool]]], late: bool = False) -> None:
-        """What the world says of tasks reaches a robot, unless it is blind."""
+    def _sense(self, name: str, sensed: Senses, said_at: float | None = None) -> None:
+        """What the world says of tasks reaches a robot, unless it is blind; `said_at` is when, if it was held back."""
         member = self.members[name]
-        if name in self._blind and not late:
+        if name in self._blind and said_at is None:
             fault, delay = self._blind[name]
             member.effects[fault, WORLD] += len(sensed[2])
             if delay is None:
                 self._late.add(name)
             else:
-                self._at(self.now + delay, 0, self._sense, name, sensed, True)
+                self._tardy.setdefault(name, {})
+                self._at(self.now + delay, 0, self._sense, name, sensed, self.now)
             return
         if member.process is Process.STOPPED:
             self._late.add(name)
+        if name in self._tardy:
+            sensed = self._in_order(self._tardy[name], sensed, self.now if said_at is None else said_at)
         member.sense(*sensed, self.now)
+
+    @staticmethod
+    def _in_order(known: dict[str, float], sensed: Senses, said_at: float) -> Senses:
+        """Without what has been overtaken: a robot drops what is older than what it knows."""
+        views = [view for view in sensed[2] if said_at >= known.get(view[0], 0.0)]
+        known.update((view[0], said_at) for view in views)
+        return sensed[0], sensed[1], views
 
 
 def _applies(view: TaskView) -> tuple[bool, bool]:
