@@ -1,7 +1,7 @@
 """What is left of a simulated mission for a judge: its log, its summary, and what a watcher saw robots sense and decide.
 
-`Evidence` is plain data, so that a test can falsify it and see the judge notice. `History` is the log read once more as spans of
-time: when each robot's process ran, and when each robot was on which task. Instants are seconds since the simulation began.
+`Evidence` is plain data, so that a test can falsify it and see the judge notice. `History` is the log read once more as spans
+of time: when each robot's process ran, and when each robot was on which task. Instants are seconds since the simulation began.
 """
 
 import math
@@ -76,9 +76,7 @@ class Witness:
             * factors.acquiescence
             * factors.learned_robot_influence
         ) == 1
-        choice = Choice(
-            decision.at, robot, decision.verb.value, decision.task, decision.cause.value, silent, ready
-        )
+        choice = Choice(decision.at, robot, decision.verb.value, decision.task, decision.cause.value, silent, ready)
         self.notes.append(choice)
 
 

@@ -1,7 +1,7 @@
 """Invariants of faults: what was scheduled happened, what is said to have happened did, and silence has its consequence.
 
-The lengths of time in here are bounds that follow from the parameters and from the delays of the world: `STEP` between two looks
-at the world, `REFRESH_PERIOD` between two reports of what faults did to messages and between two refreshes of what a body does.
+The lengths of time in here are bounds that follow from the parameters and from the delays of the world: `STEP` between two
+looks at the world, `REFRESH_PERIOD` between two reports of what faults did to messages and between two refreshes of a body.
 """
 
 import math
@@ -47,10 +47,10 @@ def is_taken_again(evidence: Evidence) -> Iterator[str]:
 
     where d is the delay of a message and p the control period. It notices the silence in its first step more than tau after the
     last message that it heard, which was sent before the fall; from then on its impatience is fast, and reaches the threshold
-    within max_delay. What may keep its motivation at 0 is the influence of learning, until it is bored; it is idle at the latest
-    from the fall on, or, where it is only just born, from tau after its birth (erratum 4). With parameters set by hand there is
-    no boredom, and the delay is threshold / fast_rate. Two steps more: one in which the motivation begins to grow, and one for
-    the grid of steps that the threshold is met between.
+    within max_delay. What may keep its motivation at 0 is the influence of learning, until it is bored; it is idle from the
+    fall on at the latest, or, where it is only just born, from tau after its birth (erratum 4). With parameters set by hand
+    there is no boredom, and the delay is threshold / fast_rate. Two steps more: one in which the motivation begins to grow,
+    and one because the threshold is met between two steps.
 
     Free means: it can do the task and senses it as open, its process runs all the time, it is idle all the time and senses and
     hears all the time, and nobody else is on the task meanwhile.
@@ -64,7 +64,7 @@ def is_taken_again(evidence: Evidence) -> Iterator[str]:
         for robot in mission.able(task):
             until = _taken_by(evidence, robot, at)
             if robot != victim and until < evidence.ended and _is_free(evidence, robot, task, at, until):
-                if how == "stopped" and not _stays_away(evidence, victim, at, until):
+                if not _stays_away(evidence, victim, at, until):
                     continue
                 taken = [one for one in history.spans if one.task == task and one.since <= until and one.until > at]
                 if not [one for one in taken if one.robot != victim] and not _completed(evidence, task, until):
@@ -81,7 +81,9 @@ def _taken_by(evidence: Evidence, robot: str, at: float) -> float:
     begun = max(at, born + own.silence_timeout + period)
     noticed = max(at + evidence.message_delay + own.silence_timeout, begun) + period
     if own.architecture is Architecture.ALLIANCE:
-        return noticed + max(own.threshold / own.for_set(task).fast_rate for task in evidence.mission.tasks) + 2 * period
+        return (
+            noticed + max(own.threshold / own.for_set(task).fast_rate for task in evidence.mission.tasks) + 2 * period
+        )
     bored = begun + longest_idleness(own) - own.max_delay + period
     return max(noticed, bored) + own.max_delay + 2 * period
 
@@ -123,7 +125,7 @@ def _senses_open(evidence: Evidence, robot: str, task: str, at: float, until: fl
 
 
 def _stays_away(evidence: Evidence, victim: str, at: float, until: float) -> bool:
-    """Whether a stopped process is not continued before `until`; messages that it then sends change everything."""
+    """Whether a process is not continued or started again before `until`; what it then says changes everything."""
     return not any(at < since <= until for since, _ in evidence.history.running.get(victim, ()))
 
 
@@ -226,7 +228,9 @@ def _least_chance(fault: Fault) -> float:
     spared = (1 - (fault.duplicate or 0.0)) * (1 - (fault.reorder or 0.0))
     if isinstance(fault.loss, Bursts):
         bad = min(fault.loss.enter, 1 - fault.loss.leave)
-        return 1 - spared * (1 - min(fault.loss.bad, fault.loss.good) - bad * max(fault.loss.bad - fault.loss.good, 0.0))
+        return 1 - spared * (
+            1 - min(fault.loss.bad, fault.loss.good) - bad * max(fault.loss.bad - fault.loss.good, 0.0)
+        )
     return 1 - spared * (1 - (fault.loss or 0.0))
 
 

@@ -2,27 +2,38 @@
 
 A mission is *promised* where
 
-- every task has a *sound* robot: one that can do it and that is not for good dead, hanging, blind or stuck at it (a robot slower
-  than `AS_GOOD_AS_STUCK` counts as stuck), and in trials before the live one, where faults do not happen, a robot that does not
-  join later;
-- nobody who lives is stuck for good at what another can do; or else failures teach: L-ALLIANCE, an ordering in which a failed
-  task is wanted less, delays that differ, no attempt that is too short to be told from a collision, no loss of the messages by
-  which teammates learn of it;
+- every task has a *sound* robot: one that can do it and that is not for good dead, hanging, blind or stuck at it (a robot
+  slower than `AS_GOOD_AS_STUCK` counts as stuck), and in trials before the live one, where faults do not happen, a robot that
+  does not join later;
+- nobody who lives is stuck for good at what another can do; or else failures teach: L-ALLIANCE, an ordering in which a
+  failed task is wanted less, delays that differ, no attempt that is too short to be told from a collision, no rule of links
+  for good, by which teammates might not learn of it;
 - an attempt can be long enough where work starts from zero each time: the limits of attempts grow (L-ALLIANCE) or are long (by
   hand);
 - the Appendix is read as mended (the second patience may be read either way).
 
-Then each task is worked on again and again until it is done, and the bound is the sum, over all tasks, of the attempts that this
-takes in the worst case, one after the other, with the longest pause between two of them. It is generous: it supposes that one
-robot at a time works, and that the slowest does.
+Then each task is worked on again and again until it is done, and the bound is the sum, over all tasks, of the attempts that
+this takes in the worst case, one after the other, with the longest pause between two of them. It is generous: it supposes
+that one robot at a time works, and that the slowest does.
 """
 
 import math
 from dataclasses import dataclass
 
 from lalliance_agents.config import Mission
-from lalliance_agents.faults import Blind, Crash, Fault, Hang, LinkFault, Slow, Stuck, robot_of
-from lalliance_agents.model.parameters import Architecture, Erratum, Ordering, Parameters
+from lalliance_agents.faults import (
+    Blind,
+    Crash,
+    Fault,
+    Hang,
+    LinkFault,
+    Partition,
+    RadioFault,
+    Slow,
+    Stuck,
+    robot_of,
+)
+from lalliance_agents.model.parameters import Architecture, Erratum, Learning, Ordering, Parameters
 
 #: A robot slowed for good by more than this is as good as stuck.
 AS_GOOD_AS_STUCK = 20.0
@@ -31,7 +42,7 @@ LEAST_GROWTH = 1.5
 #: What comes between a fault's end and the team being as if it had not been: start-up, presence, refreshed senses; in seconds.
 RECOVERY = 3.0
 #: The bound is this many times the sum of all tasks, and these seconds more.
-MARGIN, MARGIN_SECONDS = 2.0, 10.0
+MARGIN, MARGIN_SECONDS = 1.0, 10.0
 
 #: Orderings in which a failed attempt makes its task less wanted.
 _LEARNING_ORDERS = {Ordering.DERIVED, Ordering.MODIFIED_SHORTEST_FIRST}
@@ -119,9 +130,14 @@ def _restarts_in_vain(mission: Mission) -> str:
                 by_hand = own.for_set(task)
                 if min(by_hand.yield_time, by_hand.give_up_time) <= _need(mission, robot, task) * 1.1 + 1.0:
                     return "an attempt by hand is too short for its task"
-            elif own.failure_factor * own.give_up_factor < LEAST_GROWTH:
+            elif _growth(own) < LEAST_GROWTH:
                 return "attempts that start from zero hardly get longer"
     return ""
+
+
+def _growth(own: Parameters) -> float:
+    """By how much an attempt may last longer than the one before: that one ended after psi or after lambda."""
+    return own.failure_factor * min(own.give_up_factor, 1.0)
 
 
 def _is_stuck_for_good(mission: Mission, fault: Stuck) -> bool:
@@ -133,20 +149,24 @@ def _is_stuck_for_good(mission: Mission, fault: Stuck) -> bool:
 
 def _learns_nothing(mission: Mission) -> str:
     """Why robots may go on failing for ever at what another could do."""
-    for robot, spec in mission.robots.items():
-        own = mission.parameters_of(robot)
-        if own.architecture is not Architecture.L_ALLIANCE or own.ordering not in _LEARNING_ORDERS:
-            return "stuck, and failing makes nothing less wanted"
-        if own.failure_factor < LEAST_GROWTH or own.failure_factor * own.give_up_factor < LEAST_GROWTH:
-            return "stuck, and failing teaches too little"
-        if own.max_delay < 2 * own.min_delay:
-            return "stuck, and all tasks are wanted alike"
-        if min(spec.tasks.values()) * min(own.give_up_factor, 1.0) <= 1.1 * own.effective_collision_window:
-            return "stuck, and attempts look like collisions"
-    if mission.live.learning.value == "active":
+    if mission.live.learning is Learning.ACTIVE:
         return "stuck in active learning, in which nobody gives up"
-    if any(isinstance(fault, LinkFault) and fault.end == math.inf for fault in mission.faults):
+    if any(isinstance(fault, LinkFault | Partition | RadioFault) and fault.end == math.inf for fault in mission.faults):
         return "stuck, and teammates may not hear of it"
+    return next(filter(None, (_fails_in_vain(mission, robot) for robot in mission.robots)), "")
+
+
+def _fails_in_vain(mission: Mission, robot: str) -> str:
+    own = mission.parameters_of(robot)
+    if own.architecture is not Architecture.L_ALLIANCE or own.ordering not in _LEARNING_ORDERS:
+        return "stuck, and failing makes nothing less wanted"
+    if _growth(own) < LEAST_GROWTH:
+        return "stuck, and failing teaches too little"
+    if own.max_delay < 2 * own.min_delay:
+        return "stuck, and all tasks are wanted alike"
+    shortest = min(own.initial_task_time, *mission.robots[robot].tasks.values()) * min(own.give_up_factor, 1.0)
+    if shortest <= 1.1 * own.effective_collision_window:
+        return "stuck, and attempts look like collisions"
     return ""
 
 
@@ -189,13 +209,10 @@ class _Effort:
             return rounds * (4 * self._need + pause)
         if not self._restarts:
             return 2 * self._need + (math.ceil(self._need / shortest) + 1) * pause
-        growth = min(self._growth(robot) for robot in self._able)
+        growth = min(_growth(self._mission.parameters_of(robot)) for robot in self._able)
+        growth = max(growth, LEAST_GROWTH)  # by hand nothing grows, and the first attempt is long enough
         attempts = math.ceil(max(math.log(self._need / shortest) / math.log(growth), 0.0)) + 2
         return len(self._able) * attempts * (2 * growth * self._need + pause)
-
-    def _growth(self, robot: str) -> float:
-        own = self._mission.parameters_of(robot)
-        return max(own.failure_factor * own.give_up_factor, LEAST_GROWTH)
 
     def _shortest_attempt(self, robot: str) -> float:
         """Psi and lambda are no shorter than this, in seconds."""

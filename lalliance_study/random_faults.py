@@ -84,7 +84,7 @@ def _ends(chance: random.Random, found: Document, robots: Document, spared: dict
     if robot is None or found["kind"] in {"slow", "mute", "deaf"} or "delay" in found:
         return False
     if "task" in found:
-        return spared.get(found["task"]) == robot
+        return bool(spared.get(found["task"]) == robot)
     return any(spared.get(task) == robot for task in robots[robot]["tasks"])
 
 

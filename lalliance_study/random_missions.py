@@ -1,9 +1,9 @@
 """Random missions for the campaign: teams, tasks, parameters and phases; the faults are drawn in `random_faults`.
 
-Mission `number` of campaign `seed` is a function of these two numbers alone: neither how many missions are drawn nor where they
-are run changes it. It is drawn as the plain values of a mission file (`Document`), so that it can be written as YAML and read
-by every command. Most missions are small and short, since a campaign is better for many missions than for long ones; large teams
-occur all the same. All that a mission file can say is said by some of them.
+Mission `number` of campaign `seed` is a function of these two numbers alone: neither how many missions are drawn nor where
+they are run changes it. It is drawn as the plain values of a mission file (`Document`), so that it can be written as YAML and
+read by every command. Most missions are small and short, since many missions find more than long ones; large teams occur all
+the same, and all that a mission file can say is said by some of them.
 
 A mission lasts at most until its deadline. Where it must complete (`promises`) the deadline is the time by which it must have;
 elsewhere it is short, because nothing is learned from waiting for what need not happen.
@@ -99,7 +99,8 @@ def between(chance: random.Random, low: float, high: float) -> float:
 
 
 def _log_between(chance: random.Random, low: float, high: float) -> float:
-    return round(math.exp(chance.uniform(math.log(low), math.log(high))), 3)
+    drawn: float = round(math.exp(chance.uniform(math.log(low), math.log(high))), 3)
+    return drawn
 
 
 def _some(chance: random.Random, among: Sequence[T], most: int) -> list[T]:
@@ -157,13 +158,15 @@ def _team(chance: random.Random, *, box: bool, small: bool) -> tuple[Document, D
 
 
 def _own_time(chance: random.Random, base: float) -> float:
-    return round(base * chance.choice((1.0, chance.uniform(0.6, 1.6))), 3)
+    factor = chance.uniform(0.6, 1.6) if chance.random() < 0.5 else 1.0
+    return round(base * factor, 3)
 
 
 def _horizon(robots: Document, count: int) -> float:
     """About how long the mission will take, in seconds: faults and arrivals are to fall into it."""
     times = [time for spec in robots.values() for time in spec["tasks"].values()]
-    return round(1.0 + sum(times) / len(times) * math.ceil(count / len(robots)), 3)
+    mean: float = sum(times) / len(times)
+    return round(1.0 + mean * math.ceil(count / len(robots)), 3)
 
 
 def _order_tasks(chance: random.Random, tasks: Document, horizon: float) -> None:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
 import typer
 
 from lalliance_agents.errors import LallianceError, UserError
+from mission_control import campaign_command
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -248,6 +249,9 @@ def schema() -> None:
     from mission_control.missions import mission_schema
 
     typer.echo(json.dumps(mission_schema(), indent=2))
+
+
+campaign_command.register(app)
 
 
 def _load(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":
