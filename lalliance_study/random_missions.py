@@ -133,7 +133,7 @@ def _phases(chance: random.Random) -> list[Document]:
 
 def _size(chance: random.Random, low: int, high: int, *, small: bool) -> int:
     """A size that is small most of the time."""
-    share = chance.random() ** (4 if small else 2)
+    share = chance.random() ** (5 if small else 3)
     return min(high, int(low * ((high + 1) / low) ** share))
 
 
