@@ -23,6 +23,7 @@ from lalliance_agents.wire.messages import Event, Message
 from mission_control.live import Lines
 from mission_control.orders import Orders
 from mission_control.processes import GRACE, Child
+from mission_control.running import announced
 
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
@@ -88,6 +89,7 @@ class Launcher:
         asked = plan.listen if plan.connect is None else plan.connect
         self._endpoint = free_endpoint() if asked is None else asked
         self._router: Child | None = None
+        self._world: Child | None = None
         self._robots: dict[str, Child] = {}
         self._lives: dict[str, int] = {}
         self._messenger: Messenger | None = None
@@ -102,21 +104,28 @@ class Launcher:
             BusError: no router could be started or reached.
             LaunchError: the mission could not be brought to its end.
         """
-        world: Child | None = None
         try:
             if self._plan.connect is None:
                 await self._start_router()
+            name = self._plan.mission.name
             async with await open_bus(self._endpoint) as bus:
-                messenger = await self._watch(bus)
-                world = await Child.start("world", self._plan.world(self._endpoint), self._on_line, keeps_output=True)
-                first = [name for name, spec in self._plan.mission.robots.items() if spec.joins == 0]
-                await asyncio.gather(*(self._start_robot(name) for name in first))
-                summary = await self._await_end(world)
-                await self._await_robots()
-                await messenger.close()
-            return summary
+                with announced(name, self._endpoint):
+                    self._view.locate(name, self._endpoint)
+                    return await self._conduct(bus)
         finally:
-            await self._end_all(world)
+            await self._end_all()
+
+    async def _conduct(self, bus: Bus) -> dict[str, Any]:
+        messenger = await self._watch(bus)
+        world = self._world = await Child.start(
+            "world", self._plan.world(self._endpoint), self._on_line, keeps_output=True
+        )
+        first = [name for name, spec in self._plan.mission.robots.items() if spec.joins == 0]
+        await asyncio.gather(*(self._start_robot(name) for name in first))
+        summary = await self._await_end(world)
+        await self._await_robots()
+        await messenger.close()
+        return summary
 
     async def _watch(self, bus: Bus) -> Messenger:
         keys = Keys(self._plan.mission.name)
@@ -231,10 +240,10 @@ class Launcher:
             async with asyncio.timeout(2 * GRACE):
                 await asyncio.gather(*going)
 
-    async def _end_all(self, world: Child | None) -> None:
+    async def _end_all(self) -> None:
         for task in list(self._tasks):
             task.cancel()
-        children = [*self._robots.values(), *([world] if world else [])]
+        children = [*self._robots.values(), *([self._world] if self._world else [])]
         await asyncio.gather(*(child.end() for child in children))
         if self._router is not None:
             await self._router.end(grace=ROUTER_GRACE)
