@@ -13,7 +13,6 @@ from enum import Enum
 from lalliance_agents.agent import translate
 from lalliance_agents.agent.behavior import TaskSense
 from lalliance_agents.agent.briefing import chance_of, new_mind, roster, tasks_of
-from lalliance_agents.bus.base import LEASE
 from lalliance_agents.config import Mission
 from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, Heard, TrialStarted
 from lalliance_agents.model.mind import Mind
@@ -87,6 +86,8 @@ class Member:
         self._period = mission.control_period
         self._mind: Mind | None = None
         self.stopped_at = 0.0
+        #: Whether the bus has given it up since it was stopped.
+        self.given_up = False
         self._told: dict[str, tuple[bool, bool]] = {}
 
     def __repr__(self) -> str:
@@ -137,6 +138,7 @@ class Member:
         if self.runs:
             self.process = Process.STOPPED
             self.stopped_at = now
+            self.given_up = False
             # The steps before were made, if only in effect.
             self.mind.rest(self._instant(self._step_from(now) - 1))
             self._schedule()
@@ -146,7 +148,7 @@ class Member:
         if self.process is not Process.STOPPED:
             return False
         self.process = Process.RUNNING
-        lost = now - self.stopped_at > LEASE
+        lost = self.given_up
         for link in self.hears:
             if lost:
                 link.waiting.clear()

@@ -201,6 +201,7 @@ class Simulator:
         """The bus gives up a process that has been stopped for longer than its lease."""
         member = self.members[name]
         if member.process is Process.STOPPED and (member.incarnation, member.stopped_at) == (incarnation, since):
+            member.given_up = True
             self._see(name, False)
 
     def _carry_out(self, order: Order) -> None:

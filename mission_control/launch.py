@@ -1,13 +1,12 @@
 """Run a mission on this machine: a router, a world server and one process per robot, and their end.
 
-The launcher starts the processes, carries out the world's orders (kill, start), starts its router again if that dies, shows
+The launcher starts the processes, has the world's orders carried out at them, starts its router again if that dies, shows
 what happens, and leaves no process behind. It takes no part in the mission: robots and world talk to one another alone.
 """
 
 import asyncio
 import contextlib
 import json
-import signal
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,8 +21,9 @@ from lalliance_agents.errors import BusError, LallianceError
 from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message
 from mission_control.live import Lines
+from mission_control.orders import Orders
 from mission_control.processes import GRACE, Child
-from world_server.failures import Deed
+from mission_control.running import announced
 
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
@@ -89,9 +89,11 @@ class Launcher:
         asked = plan.listen if plan.connect is None else plan.connect
         self._endpoint = free_endpoint() if asked is None else asked
         self._router: Child | None = None
+        self._world: Child | None = None
         self._robots: dict[str, Child] = {}
         self._lives: dict[str, int] = {}
-        self._done: set[int] = set()
+        self._messenger: Messenger | None = None
+        self._orders = Orders(plan.mission, self._robots, self._restart, self._report)
         self._tasks: set[asyncio.Task[None]] = set()
         self._robot_ended = asyncio.Event()
 
@@ -102,51 +104,50 @@ class Launcher:
             BusError: no router could be started or reached.
             LaunchError: the mission could not be brought to its end.
         """
-        world: Child | None = None
         try:
             if self._plan.connect is None:
                 await self._start_router()
+            name = self._plan.mission.name
             async with await open_bus(self._endpoint) as bus:
-                messenger = await self._watch(bus)
-                world = await Child.start("world", self._plan.world(self._endpoint), self._on_line, keeps_output=True)
-                first = [name for name, spec in self._plan.mission.robots.items() if spec.joins == 0]
-                await asyncio.gather(*(self._start_robot(name) for name in first))
-                summary = await self._await_end(world)
-                await self._await_robots()
-                await messenger.close()
-            return summary
+                with announced(name, self._endpoint):
+                    self._view.locate(name, self._endpoint)
+                    return await self._conduct(bus)
         finally:
-            await self._end_all(world)
+            await self._end_all()
+
+    async def _conduct(self, bus: Bus) -> dict[str, Any]:
+        messenger = await self._watch(bus)
+        world = self._world = await Child.start(
+            "world", self._plan.world(self._endpoint), self._on_line, keeps_output=True
+        )
+        first = [name for name, spec in self._plan.mission.robots.items() if spec.joins == 0]
+        await asyncio.gather(*(self._start_robot(name) for name in first))
+        summary = await self._await_end(world)
+        await self._await_robots()
+        await messenger.close()
+        return summary
 
     async def _watch(self, bus: Bus) -> Messenger:
         keys = Keys(self._plan.mission.name)
-        messenger = Messenger(bus, keys, LAUNCHER, 1, self._clock.now)
+        messenger = self._messenger = Messenger(bus, keys, LAUNCHER, 1, self._clock.now)
         for kind in (Kind.EVENT, Kind.STATUS, Kind.DECISION, Kind.MOTIVATION):
             await messenger.listen(keys.build(kind), self._take)
+        await bus.announce_presence(keys.build(Kind.LAUNCHER))
         return messenger
 
     def _take(self, _: Key, message: Message) -> None:
         if message.sender != WORLD and message.sender not in self._plan.mission.robots:
             return
         if isinstance(message, Event) and message.kind == "order":
-            self._carry_out(message)
+            self._orders.take(message)
         self._view.take(message, self._clock.now())
 
-    def _carry_out(self, order: Event) -> None:
-        """Do what the world orders, each order once, and nothing that the mission does not foresee."""
-        number, deed, robot = order.details.get("number"), order.details.get("deed"), order.robot
-        if not isinstance(number, int) or number in self._done or robot not in self._plan.mission.robots:
-            return
-        faults = [fault for fault in self._plan.mission.faults if fault.robot == robot]
-        child = self._robots.get(robot)
-        if deed == Deed.KILL and faults and child is not None:
-            self._done.add(number)
-            child.send_signal(signal.SIGKILL)
-        elif deed == Deed.START and not (child is not None and child.running):
-            returns = any(fault.restart for fault in faults)
-            if returns or self._plan.mission.robots[robot].joins > 0:
-                self._done.add(number)
-                self._spawn(self._start_robot(robot))
+    def _restart(self, robot: str) -> None:
+        self._spawn(self._start_robot(robot))
+
+    def _report(self, order: int) -> None:
+        if self._messenger is not None:
+            self._messenger.send(Kind.CHAOS_DEED, number=order)
 
     def _spawn(self, work: Any) -> None:
         task = asyncio.create_task(work)
@@ -157,6 +158,7 @@ class Launcher:
         self._lives[name] = self._lives.get(name, 0) + 1
         child = await Child.start(name, self._plan.robot(name, self._lives[name], self._endpoint), self._on_line)
         self._robots[name] = child
+        self._orders.returned(name)
         self._spawn(self._observe(child))
 
     async def _observe(self, child: Child) -> None:
@@ -198,26 +200,29 @@ class Launcher:
         ending = asyncio.create_task(world.read_all())
         deserted = asyncio.create_task(self._await_desertion())
         try:
-            await asyncio.wait({ending, deserted}, return_when=asyncio.FIRST_COMPLETED)
-            if not ending.done():
-                await asyncio.wait({ending}, timeout=LAST_CHANCE)
-            if not ending.done():
-                ends = ", ".join(f"{name}: {child.status}" for name, child in self._robots.items())
-                raise LaunchError(f"no robot is left to complete the mission ({ends})")
+            while not ending.done():
+                await asyncio.wait({ending, deserted}, return_when=asyncio.FIRST_COMPLETED)
+                if not ending.done():
+                    await asyncio.wait({ending}, timeout=LAST_CHANCE)
+                if not ending.done() and self._is_deserted():
+                    ends = ", ".join(f"{name}: {child.status}" for name, child in self._robots.items())
+                    raise LaunchError(f"no robot is left to complete the mission ({ends})")
+                if deserted.done():  # and a robot has come back since
+                    deserted = asyncio.create_task(self._await_desertion())
             return await self._read_summary(world, ending.result())
         finally:
             ending.cancel()
             deserted.cancel()
 
     async def _await_desertion(self) -> None:
-        """Return when every robot has been there, has ended, and will not return."""
-        returning = {fault.robot for fault in self._plan.mission.faults if fault.restart}
-        while returning or self._robots.keys() != self._plan.mission.robots.keys() or self._any_robot_runs():
+        while not self._is_deserted():
             await self._robot_ended.wait()
             self._robot_ended.clear()
 
-    def _any_robot_runs(self) -> bool:
-        return any(child.running for child in self._robots.values())
+    def _is_deserted(self) -> bool:
+        """Whether every robot has been there, has ended, and will not return; one that is stopped is still there."""
+        all_came = self._robots.keys() == self._plan.mission.robots.keys()
+        return all_came and not self._orders.may_return and not any(child.running for child in self._robots.values())
 
     async def _read_summary(self, world: Child, output: str) -> dict[str, Any]:
         """The last line of the world's output; what its environment may have printed stands before."""
@@ -229,15 +234,16 @@ class Launcher:
         return summary
 
     async def _await_robots(self) -> None:
-        """Robots end by themselves when the mission is over."""
+        """Robots end by themselves when the mission is over, but for those that are stopped."""
+        going = [child.wait() for child in self._robots.values() if not child.stopped]
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(2 * GRACE):
-                await asyncio.gather(*(child.wait() for child in self._robots.values()))
+                await asyncio.gather(*going)
 
-    async def _end_all(self, world: Child | None) -> None:
+    async def _end_all(self) -> None:
         for task in list(self._tasks):
             task.cancel()
-        children = [*self._robots.values(), *([world] if world else [])]
+        children = [*self._robots.values(), *([self._world] if self._world else [])]
         await asyncio.gather(*(child.end() for child in children))
         if self._router is not None:
             await self._router.end(grace=ROUTER_GRACE)

@@ -224,6 +224,10 @@ ADDED = {
     "did you mean 'r2'?",
     "faults: [{kind: crsh, robot: r1, at: 1}]": "faults.0.kind: 'crsh' is not allowed; expected one of crash, "
     "hang, stuck, slow, mute, deaf, blind; did you mean 'crash'?",
+    "faults: [{kind: slow, robot: r1, at: 1, factor: 2, loss: 0.1}]": "faults.0.loss: unknown field; expected one of at, "
+    "until, kind, robot, factor",
+    "faults: [{link: {}, robot: r1, at: 1, cut: yes}]": "faults.0.robot: unknown field; expected one of at, until, link, "
+    "loss, delay, duplicate, reorder, held, cut",
     "faults: [{kind: crash, robot: r1, at: 600}]": "faults.0.at: 600 s is not before the mission's deadline; "
     "expected less than 600 s",
     "faults: [{kind: crash, robot: r1, at: 1, restart: 'yes'}]": "faults.0.restart: 'yes' is text; "

@@ -186,8 +186,13 @@ class Failures:
         entry = self._add(timed, elapsed, ends)
         return entry, self.advance(elapsed)
 
-    def heal(self, name: str, elapsed: float) -> list[Change]:
-        """End the fault `name`, or all that are in force if it is empty.
+    def heal(self, name: str, elapsed: float, *, killing: bool) -> tuple[list[str], list[Change]]:
+        """End the fault `name`, or all that are in force if it is empty; which they are, and what has changed already.
+
+        Args:
+            name: which.
+            elapsed: the present instant, in seconds.
+            killing: whether somebody may be killing a process just now: its crash is over once it was seen to be dead.
 
         Raises:
             UserError: there is no such fault in force.
@@ -198,7 +203,8 @@ class Failures:
             raise UserError(f"no fault {name!r} is in force; expected one of: {known}")
         for entry in on:
             entry.ends = elapsed
-        return [self._end(entry) for entry in on]
+        over = [self._end(entry) for entry in on if not (killing and entry.must_die)]
+        return [entry.name for entry in on], over
 
     def orders(self, elapsed: float) -> list[Order]:
         """All orders that are due and not confirmed, in the order in which they became due (joins first)."""
@@ -279,7 +285,9 @@ class Failures:
 
 
 def _timed(fault: Fault, begins: float, ends: float) -> Fault:
-    return fault.model_copy(update={"at": begins, "until": None if ends == math.inf else ends})
+    times = {"at": begins, "until": None if ends == math.inf else ends}
+    # Whoever says how long a crash lasts means that the robot returns.
+    return fault.model_copy(update=times | ({"restart": ends < math.inf} if isinstance(fault, Crash) else {}))
 
 
 def _holds_up(fault: Fault, robot: str, task: str) -> bool:

@@ -252,6 +252,8 @@ class World:
                 f"{describe(fault)}: nobody here can reach the robots' processes; expected a mission started by "
                 "`lalliance run`, or a fault of another kind"
             )
+        if isinstance(fault, Crash | Hang) and fault.robot in self.bodies and not self.bodies[fault.robot].present:
+            raise UserError(f"{describe(fault)}: {fault.robot} is not there; expected a robot whose process runs")
         entry, changes = self.failures.inject(fault, self.elapsed, lasts)
         self._changed(changes)
         until = "until it is healed" if entry.ends == math.inf else f"until {entry.ends:.1f} s"
@@ -264,9 +266,9 @@ class World:
             UserError: there is no such fault in force.
         """
         self.advance(now)
-        changes = self.failures.heal(name, self.elapsed)
+        healed, changes = self.failures.heal(name, self.elapsed, killing=self.has_launcher)
         self._changed(changes)
-        return f"healed {', '.join(change.entry.name for change in changes)}" if changes else "no fault is in force"
+        return f"healed {', '.join(healed)}" if healed else "no fault is in force"
 
     @property
     def _where(self) -> str:

@@ -103,7 +103,7 @@ class Robot:
         self._broken: set[str] = set()
         self._contradicted: set[str] = set()
         self._store_failed = False
-        self._saved_version = self._version()
+        self._saved_version = self.mind.knowledge.version
         self._saving: asyncio.Task[None] | None = None
         self._refresh_due = self._greeting_due = self._motivation_due = now
         self._over: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
@@ -311,7 +311,7 @@ class Robot:
         if now >= self._greeting_due:
             self._greeting_due = now + GREETING_PERIOD
             self._greet()
-        if self._catalog is not None and self._version() != self._saved_version and self._saving is None:
+        if self._catalog is not None and self.mind.knowledge.version != self._saved_version and self._saving is None:
             self._saving = asyncio.create_task(self._save())
             self._saving.add_done_callback(lambda _: setattr(self, "_saving", None))
 
@@ -322,13 +322,10 @@ class Robot:
         key = self._keys.build(Kind.HELLO, robot=self.name)
         return [Sample(key, self._messenger.compose(Kind.HELLO, tasks=list(self._repertoire)))]
 
-    def _version(self) -> int:
-        return sum(monitor.version for monitor in self.mind.knowledge.monitors.values())
-
     async def _save(self) -> None:
-        if self._catalog is None or self._version() == self._saved_version:
+        if self._catalog is None or self.mind.knowledge.version == self._saved_version:
             return
-        version, learned = self._version(), self.mind.knowledge.records()
+        version, learned = self.mind.knowledge.version, self.mind.knowledge.records()
         try:
             await asyncio.to_thread(self._catalog.save, learned)
             self._saved_version = version

@@ -45,13 +45,14 @@ class Knowledge:
         if self.version == self._seen:
             return
         self._seen = self.version
-        known = [(robot, time) for monitor in self.monitors.values() for robot, time in monitor.times()]
-        measured = [time for monitor in self.monitors.values() for time in monitor.measured()]
-        self._fallback = max(measured, default=self._parameters.initial_task_time)
-        times = [time for _, time in known] + [self.own_time(task) for task in self.monitors]
-        self._low = min((time for time in times if not math.isnan(time)), default=math.nan)
-        self._high = max((time for time in times if not math.isnan(time)), default=math.nan)
-        self._knows_teammates = any(robot != self._me for robot, _ in known)
+        extents = [monitor.extent() for monitor in self.monitors.values()]
+        longest = max((extent.longest for extent in extents), default=0.0)
+        self._fallback = longest if longest > 0.0 else self._parameters.initial_task_time
+        own = [time for time in map(self.own_time, self.monitors) if not math.isnan(time)]
+        low = min([extent.low for extent in extents] + own, default=math.inf)
+        high = max([extent.high for extent in extents] + own, default=-math.inf)
+        self._low, self._high = (low, high) if low <= high else (math.nan, math.nan)
+        self._knows_teammates = any(extent.of_teammates for extent in extents)
 
     def own_time(self, task: str) -> float:
         """task_time_i(i, j, t) in seconds, or what stands for it; NaN if erratum 10 is read literally."""

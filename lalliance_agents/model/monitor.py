@@ -12,7 +12,7 @@ may still be working and is not judged before the task is complete or the teamma
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -41,21 +41,36 @@ class Attempt:
     left: float | None = None
 
 
+class Extent(NamedTuple):
+    """What is known of one task at all, in seconds."""
+
+    low: float
+    """The least task time of any robot; infinite if none is known."""
+    high: float
+    """The greatest; minus infinity if none is known."""
+    longest: float
+    """The greatest time by samples alone, whatever has failed since; 0 if there is none."""
+    of_teammates: bool
+    """Whether a teammate's time is known."""
+
+
 class _Performance:
     """Samples of one robot."""
 
-    __slots__ = ("floor", "floor_left", "samples", "time")
+    __slots__ = ("floor", "floor_left", "measured", "samples", "time")
 
     def __init__(self, trials: int, record: Record) -> None:
         self.samples: deque[float] = deque(record.samples, maxlen=trials)
         self.floor_left = min(record.floor_left, trials)
         self.floor = record.floor if self.floor_left > 0 else 0.0
         self.time: float | None = None
+        self.measured = 0.0
         self.refresh()
 
     def refresh(self) -> None:
-        """Compute the task time anew; None while there is no sample."""
+        """Compute the task time anew, and the time by the samples alone; None and 0 while there is no sample."""
         self.time = task_time(self.samples, self.floor) if self.samples else None
+        self.measured = (task_time(self.samples) if self.floor else self.time or 0.0) if self.samples else 0.0
 
 
 class Monitor:
@@ -78,9 +93,8 @@ class Monitor:
         self._attempts: dict[str, Attempt] = {}
         self._anybody_left = False
         self._earlier = 0
-        #: Grows with each change of what is known.
-        self.version = 0
-        #: Told of each such change.
+        self._extent: Extent | None = None
+        #: Told of each change of what is known.
         self.on_change: Callable[[], None] = lambda: None
 
     def new_trial(self) -> None:
@@ -196,11 +210,13 @@ class Monitor:
         self._changed(known)
 
     def _of(self, robot: str) -> _Performance:
-        return self._performances.setdefault(robot, _Performance(self._trials, Record(())))
+        if robot not in self._performances:
+            self._performances[robot] = _Performance(self._trials, Record(()))
+        return self._performances[robot]
 
     def _changed(self, known: _Performance) -> None:
         known.refresh()
-        self.version += 1
+        self._extent = None
         self.on_change()
 
     def task_time(self, robot: str) -> float | None:
@@ -213,13 +229,18 @@ class Monitor:
         known = self._performances.get(robot)
         return 0.0 if known is None else known.floor
 
-    def times(self) -> Iterable[tuple[str, float]]:
-        """Each robot whose time is known, with that time in seconds."""
-        return [(robot, known.time) for robot, known in self._performances.items() if known.time is not None]
-
-    def measured(self) -> Iterable[float]:
-        """The time of each robot by its samples alone, whatever has failed since, in seconds."""
-        return [task_time(known.samples) for known in self._performances.values() if known.samples]
+    def extent(self) -> Extent:
+        """The range of the times known."""
+        if self._extent is None:
+            known = self._performances
+            times = {robot: one.time for robot, one in known.items() if one.time is not None}
+            self._extent = Extent(
+                min(times.values(), default=math.inf),
+                max(times.values(), default=-math.inf),
+                max((one.measured for one in known.values()), default=0.0),
+                any(robot != self._me for robot in times),
+            )
+        return self._extent
 
     def count(self, robot: str) -> int:
         """The number of samples kept of `robot`, at most mu."""
@@ -236,5 +257,5 @@ class Monitor:
     def restore(self, records: Mapping[str, Record]) -> None:
         """Take what was learned in earlier missions."""
         self._performances = {robot: _Performance(self._trials, record) for robot, record in records.items()}
-        self.version += 1
+        self._extent = None
         self.on_change()

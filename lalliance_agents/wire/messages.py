@@ -27,9 +27,13 @@ Count = Annotated[int, Field(ge=0, lt=2**63)]
 #: The longest time that can be said, in seconds.
 LONGEST = 1e12
 Seconds = Annotated[float, Field(ge=0, le=LONGEST)]
-Word = Annotated[str, Field(max_length=40)]
+#: Letters that a word may have.
+LONGEST_WORD = 40
+Word = Annotated[str, Field(max_length=LONGEST_WORD)]
 #: Letters that a line of text may have.
 LONGEST_LINE = 500
+#: Letters that a fault in a command may have.
+LONGEST_FAULT = 2000
 Line = Annotated[str, Field(max_length=LONGEST_LINE)]
 #: Belongs to every list and every map in a message: to spell out all the faults of a large one takes very long.
 FIRST_FAULT = Field(fail_fast=True)
@@ -235,7 +239,7 @@ class ChaosCommand(Message):
     """What an operator asks of the world."""
 
     verb: Literal["inject", "heal", "status"]
-    fault: str = Field(default="", max_length=2000)
+    fault: str = Field(default="", max_length=LONGEST_FAULT)
     """inject: the fault as JSON, in the fields of a mission file; `at` is the present instant."""
     lasts: Seconds | None = None
     """inject: how long it is in force, in seconds; None: what the fault itself says."""
