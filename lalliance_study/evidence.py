@@ -161,7 +161,8 @@ def _read_process(history: History, robot: _Robot, line: Line) -> None:
     if line.why in {"started", "continued"}:
         if robot.runs_since is not None:
             history.broken.append(f"{at:.3f} {name} is {line.why} while it runs")
-        robot.runs_since = at
+        else:
+            robot.runs_since = at
         if line.why == "started":
             history.births.setdefault(name, []).append(at)
         return
@@ -178,6 +179,7 @@ def _read_decision(history: History, robot: _Robot, line: Line) -> None:
     if line.what == Verb.ACTIVATE:
         if robot.task is not None:
             history.broken.append(f"{at:.3f} {name} activates {task} while {robot.task} is active")
+            _leave(history, name, robot, at)
         robot.task, robot.on_since = task, at
         return
     if robot.task != task:

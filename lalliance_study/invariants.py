@@ -11,7 +11,7 @@ from lalliance_agents.model.events import Cause, Verb
 from lalliance_agents.model.parameters import SLACK
 from lalliance_study import fault_invariants
 from lalliance_study.accounts import attempts_are_real, credit_is_due, takeovers_are_real, totals_agree
-from lalliance_study.evidence import Evidence, Sight
+from lalliance_study.evidence import Choice, Evidence, Sight
 from lalliance_study.promises import promise, sound
 
 
@@ -70,23 +70,21 @@ def _state(sight: Sight) -> str:
 
 def leaves_what_is_closed(evidence: Evidence) -> Iterator[str]:
     """A set ends at the robot's next control step after the robot sensed that its task is complete or does not apply."""
-    period = evidence.mission.control_period
     due: dict[tuple[str, str], Sight] = {}
     active: dict[str, set[str]] = {}
     for note in evidence.notes:
-        if isinstance(note, Sight):
-            due.pop((note.robot, note.task), None)
-            closed = note.complete or not note.applicable
-            # A robot that was killed meanwhile has left its task without a word.
-            if closed and note.task in active.get(note.robot, ()) and evidence.history.is_on(*note[1:3], note.at):
-                due[note.robot, note.task] = note
-        elif note.verb == Verb.ACTIVATE:
+        closed_since = due.pop((note.robot, note.task), None)
+        if closed_since is not None:
+            yield from _stayed(evidence, closed_since, note.at)
+        if isinstance(note, Choice) and note.verb == Verb.ACTIVATE:
             active.setdefault(note.robot, set()).add(note.task)
-        else:
+        elif isinstance(note, Choice):
             active.get(note.robot, set()).discard(note.task)
-            sight = due.pop((note.robot, note.task), None)
-            if sight is not None and note.at > sight.at + period + SLACK:
-                yield from _stayed(evidence, sight, note.at)
+        elif note.complete or not note.applicable:
+            # A robot that was killed meanwhile has left its task without a word.
+            here = note.task in active.get(note.robot, ())
+            if here and evidence.history.is_on(note.robot, note.task, note.at):
+                due[note.robot, note.task] = note
     for sight in due.values():
         yield from _stayed(evidence, sight, evidence.ended)
 

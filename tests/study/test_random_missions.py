@@ -97,7 +97,9 @@ def test_most_missions_are_promised_to_complete_and_some_are_not(missions: list[
     assert {"failures teach", "a task keeps no sound robot"} <= why.keys()
     for mission in missions:
         promised = promise(mission).seconds
-        assert promised is None or (promised <= mission.deadline and all(sound(mission, task) for task in mission.tasks))
+        assert promised is None or (
+            promised <= mission.deadline and all(sound(mission, task) for task in mission.tasks)
+        )
 
 
 def test_what_is_no_mission_of_its_environment_is_refused() -> None:
