@@ -178,7 +178,7 @@ class Simulator:
         member = self.members[order.robot]
         match order.deed:
             case Deed.KILL:
-                member.kill()
+                member.kill(self.now)
                 self._soon(self._see, order.robot, False)
             case Deed.START:
                 if member.process is not Process.GONE:
@@ -298,7 +298,7 @@ class Simulator:
             dropped={reason: count for reason, count in dropped.items() if count},
             teammates={},
             effects=effects,
-            ticks=member.steps,
+            ticks=member.periods(self.now),
             missed=0,
             final=final,
         )

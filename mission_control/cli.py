@@ -21,6 +21,7 @@ import typer
 from lalliance_agents.errors import LallianceError, UserError
 from mission_control.chaos import chaos
 from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
+from mission_control.simulate import simulate
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -39,7 +40,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.add_typer(chaos, name="chaos")
 
 Speed = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Mission seconds per real second.")]
 Seed = Annotated[int | None, typer.Option(min=0, help="All randomness; default: the mission's own seed.")]
@@ -110,6 +110,9 @@ def run(
     else:
         show(summary, console)
     raise typer.Exit(0 if summary["complete"] else 1)
+
+
+app.command()(simulate)
 
 
 @app.command()
@@ -249,6 +252,9 @@ def schema() -> None:
     from mission_control.missions import mission_schema
 
     typer.echo(json.dumps(mission_schema(), indent=2))
+
+
+app.add_typer(chaos, name="chaos")
 
 
 def _load(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":
