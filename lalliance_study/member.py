@@ -88,6 +88,7 @@ class Member:
         self.stopped_at = 0.0
         #: Whether the bus has given it up since it was stopped.
         self.given_up = False
+        self._lived = self._missed = 0
         self._told: dict[str, tuple[bool, bool]] = {}
 
     def __repr__(self) -> str:
@@ -119,6 +120,7 @@ class Member:
         self._step = 0  # the control steps made or left out so far
         self._first = now + chance.random() * self._period
         self._after_pause = True
+        self._missed = 0
         for link in self.hears:
             self._keep(link)
             link.reset()
@@ -126,8 +128,17 @@ class Member:
         self._broadcast_due = now
         self._schedule()
 
-    def kill(self) -> None:
+    def periods(self, now: float) -> int:
+        """The control periods of all its lives so far, but for those in which it was stopped."""
+        return self._lived + (self._periods_here(now) if self.runs else 0)
+
+    def _periods_here(self, now: float) -> int:
+        return max(int((now - self._first) / self._period) + 1 - self._missed, 0)
+
+    def kill(self, now: float) -> None:
         """End as by SIGKILL."""
+        if self.runs:
+            self._lived += self._periods_here(now)
         self.process = Process.GONE
         self.task = None
         self._mind = None
@@ -136,6 +147,7 @@ class Member:
     def stop(self, now: float) -> None:
         """Stop as by SIGSTOP."""
         if self.runs:
+            self._listen(now)  # what has come until now is heard, also if it was to be looked at later
             self.process = Process.STOPPED
             self.stopped_at = now
             self.given_up = False
@@ -154,6 +166,7 @@ class Member:
                 link.waiting.clear()
                 link.forget()
         self._step = max(math.ceil((now - self._first) / self._period - SLACK), self._step)
+        self._missed += int((now - self.stopped_at) / self._period)
         self._after_pause = True
         self._wake_step = self._step
         self._lapse_step = max(self._lapse_step, self._step)

@@ -22,6 +22,7 @@ from lalliance_agents.errors import LallianceError, UserError
 from mission_control import campaign_command
 from mission_control.chaos import chaos
 from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
+from mission_control.simulate import simulate
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -40,7 +41,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.add_typer(chaos, name="chaos")
 
 Speed = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Mission seconds per real second.")]
 Seed = Annotated[int | None, typer.Option(min=0, help="All randomness; default: the mission's own seed.")]
@@ -111,6 +111,9 @@ def run(
     else:
         show(summary, console)
     raise typer.Exit(0 if summary["complete"] else 1)
+
+
+app.command()(simulate)
 
 
 @app.command()
@@ -252,6 +255,7 @@ def schema() -> None:
     typer.echo(json.dumps(mission_schema(), indent=2))
 
 
+app.add_typer(chaos, name="chaos")
 campaign_command.register(app)
 
 
