@@ -7,12 +7,14 @@ all. Here stand those of tasks, robots and accounts; what concerns faults and si
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+from lalliance_agents.faults import Blind
 from lalliance_agents.model.events import Cause, Verb
 from lalliance_agents.model.parameters import SLACK
 from lalliance_study import fault_invariants
 from lalliance_study.accounts import attempts_are_real, credit_is_due, takeovers_are_real, totals_agree
 from lalliance_study.evidence import Choice, Evidence, Sight
 from lalliance_study.promises import promise, sound
+from world_server.world import REFRESH_PERIOD, STEP
 
 
 class Violation(NamedTuple):
@@ -107,6 +109,42 @@ def silence_is_long(evidence: Evidence) -> Iterator[str]:
                 )
 
 
+def contenders_are_heard(evidence: Evidence) -> Iterator[str]:
+    """A task is yielded only to a teammate that was heard on it within tau."""
+    for choice in evidence.choices():
+        tau = evidence.mission.parameters_of(choice.robot).silence_timeout
+        if choice.verb == Verb.YIELD and choice.silent_for > tau + SLACK:
+            yield (
+                f"{choice.at:.3f} {choice.robot} yields {choice.task} to a teammate that it has not heard on it for "
+                f"{choice.silent_for:.3f} s, tau is {tau:g} s"
+            )
+
+
+def completions_are_sensed(evidence: Evidence) -> Iterator[str]:
+    """A robot whose process runs senses that a task is complete within a refresh of the world, and the delay of its senses.
+
+    Told of the last trial, and of robots whose senses are not held back for a time.
+    """
+    mission, began, history = evidence.mission, evidence.began, evidence.history
+    delays = {one.robot: one.delay for one in mission.faults if isinstance(one, Blind)}
+    sensed = {
+        (note.robot, note.task)
+        for note in evidence.notes
+        if isinstance(note, Sight) and note.at >= began and note.complete
+    }
+    for task, record in evidence.summary["tasks"].items():
+        if record["completed_at"] is None:
+            continue
+        for robot in mission.able(task):
+            delay = delays.get(robot, 0.0)
+            since = began + record["completed_at"]
+            if delay is None or (robot, task) in sensed:
+                continue
+            until = since + REFRESH_PERIOD + 2 * STEP + delay + 0.01
+            if until < evidence.ended and history.ran_throughout(robot, since, until):
+                yield f"{robot} has not sensed by {until:.3f} that {task} was completed at {since:.3f}"
+
+
 def time_goes_on(evidence: Evidence) -> Iterator[str]:
     """The log is in order of time."""
     before = 0.0
@@ -125,6 +163,8 @@ INVARIANTS: dict[str, Callable[[Evidence], Iterator[str]]] = {
         only_what_is_open,
         leaves_what_is_closed,
         silence_is_long,
+        contenders_are_heard,
+        completions_are_sensed,
         time_goes_on,
         credit_is_due,
         attempts_are_real,

@@ -5,7 +5,9 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 
+from lalliance_agents.errors import LallianceError
 from lalliance_study.campaign import Result, examine
 from mission_control.processes import end_with_parent
 
@@ -27,6 +29,9 @@ def run_campaign(seed: int, missions: int, jobs: int, report: Callable[[Result],
         missions: how many.
         jobs: the number of processes; 1: this one.
         report: called with the whole result so far after each part.
+
+    Raises:
+        LallianceError: one of the processes was killed.
     """
     total = Result()
     try:
@@ -56,6 +61,8 @@ def _at_once(seed: int, missions: int, jobs: int) -> Iterator[Result]:
             done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for one in done:
                 yield one.result()
+    except BrokenProcessPool:
+        raise LallianceError("a process of the campaign was killed; expected it to live, is memory short?") from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         if waiting:

@@ -164,6 +164,21 @@ def test_a_silence_that_is_too_short() -> None:
     assert "because of silence after 0.900 s, tau is 1 s" in facts(evidence, "silence_is_long")
 
 
+def test_a_contender_that_is_not_heard() -> None:
+    def change(note: Sight | Choice) -> Sight | Choice:
+        return note._replace(verb="yield", silent_for=1.1) if isinstance(note, Choice) else note
+
+    told = facts(edit_notes(fresh("crash"), change), "contenders_are_heard")
+    assert "one yields a to a teammate that it has not heard on it for 1.100 s, tau is 1 s" in told
+
+
+def test_a_completion_that_is_not_sensed() -> None:
+    evidence = edit_notes(fresh("trials"), lambda note: None if isinstance(note, Sight) and note.complete else note)
+    assert "completions_are_sensed" not in broken(evidence)  # the trial ends before they must have
+    evidence = edit_notes(fresh("crash"), lambda note: None if isinstance(note, Sight) and note.complete else note)
+    assert "two has not sensed by" in facts(evidence, "completions_are_sensed")
+
+
 def test_a_log_that_goes_back_in_time() -> None:
     evidence = fresh("crash")
     assert "is logged after" in facts(replace(evidence, log=evidence.log[::-1]), "time_goes_on")
