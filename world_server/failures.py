@@ -207,9 +207,10 @@ class Failures:
         return [entry.name for entry in on], over
 
     def orders(self, elapsed: float) -> list[Order]:
-        """All orders that are due and not confirmed."""
+        """All orders that are due and not confirmed, in the order in which they became due (joins first)."""
         due = [entry.order for entry in self.entries if entry.order is not None]
-        return due + [order for robot, order in self._joining.items() if reaches(elapsed, self._joins[robot])]
+        due += [order for robot, order in self._joining.items() if reaches(elapsed, self._joins[robot])]
+        return sorted(due, key=lambda order: order.number)
 
     def done(self, number: int, elapsed: float) -> None:
         """Whoever holds the processes has carried out an order."""
