@@ -86,9 +86,9 @@ class Member:
         self._period = mission.control_period
         self._mind: Mind | None = None
         self.stopped_at = 0.0
+        self._lived = self._missed = 0
         #: Whether the bus has given it up since it was stopped.
         self.given_up = False
-        self._lived = self._missed = 0
         self._told: dict[str, tuple[bool, bool]] = {}
 
     def __repr__(self) -> str:

@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import time
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Failing missions that are made small; of a defect that strikes everywhere a few examples are enough.
 MOST_MADE_SMALL = 10
+#: Missions that are handed to a process at once.
+PART = 16
 
 Missions = Annotated[int, typer.Option(min=1, help="How many missions.")]
 Seed = Annotated[
@@ -30,11 +31,6 @@ Replay = Annotated[Path | None, typer.Option(metavar="FILE", help="Simulate and 
 Jobs = Annotated[int | None, typer.Option(min=1, max=1024, help="Processes; default: one per processor.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output.")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Where missions that fail are written, made small.")]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command()(campaign)
 
 
 def campaign(
@@ -57,7 +53,7 @@ def campaign(
     _check_writable(out)
     began = time.monotonic()
     if only is None:
-        result, interrupted = _examine_many(seed, missions, jobs or os.cpu_count() or 1)
+        result, interrupted = _examine_many(seed, missions, jobs)
     else:
         from lalliance_study.campaign import examine
 
@@ -83,23 +79,21 @@ def campaign(
     raise typer.Exit(1 if result.failures else 0)
 
 
-def _examine_many(seed: int, missions: int, jobs: int) -> "tuple[Result, bool]":
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+def _examine_many(seed: int, missions: int, jobs: int | None) -> "tuple[Result, bool]":
+    """What came of the missions 0 to `missions` - 1, and whether Ctrl-C ended it early."""
+    from lalliance_study.campaign import Result, examine
+    from mission_control.pool import at_once, progress
 
-    from mission_control.campaign_pool import run_campaign
-
-    console = Console(stderr=True)
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    progress = Progress(*columns, console=console, transient=True)
-    bar = progress.add_task("missions", total=missions)
-
-    def report(result: "Result") -> None:
-        failed = f", [red]{len(result.failures)} failed[/red]" if result.failures else ""
-        progress.update(bar, completed=result.missions, description=f"missions{failed}")
-
-    with progress if console.is_terminal else nullcontext():
-        return run_campaign(seed, missions, jobs, report)
+    total = Result()
+    parts = ((seed, range(first, min(first + PART, missions))) for first in range(0, missions, PART))
+    try:
+        with progress("missions", missions) as advance:
+            for part in at_once(examine, parts, jobs):
+                total.add(part)
+                advance(part.missions, f"{len(total.failures)} failed" if total.failures else "")
+    except KeyboardInterrupt:
+        return total, True
+    return total, False
 
 
 def _check_writable(out: Path) -> None:

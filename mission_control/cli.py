@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 import typer
 
 from lalliance_agents.errors import LallianceError, UserError
-from mission_control import campaign_command
+from mission_control.campaign_command import campaign
 from mission_control.chaos import chaos
 from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
 from mission_control.simulate import simulate
@@ -114,6 +114,7 @@ def run(
 
 
 app.command()(simulate)
+app.command()(campaign)
 
 
 @app.command()
@@ -256,7 +257,6 @@ def schema() -> None:
 
 
 app.add_typer(chaos, name="chaos")
-campaign_command.register(app)
 
 
 def _load(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":

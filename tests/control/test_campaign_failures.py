@@ -1,6 +1,7 @@
 """What `lalliance campaign` does with missions that fail: here all with three tasks or more are taken to."""
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,8 @@ from lalliance_agents.config import Mission
 from lalliance_agents.errors import LallianceError
 from lalliance_agents.mission_file import load_mission
 from lalliance_study.invariants import Violation
-from mission_control import campaign_pool
 from mission_control.campaign_command import campaign
+from mission_control.pool import at_once
 
 
 @pytest.fixture(autouse=True)
@@ -92,11 +93,6 @@ def test_ctrl_c_while_missions_are_made_small_still_writes_them(
     assert list(tmp_path.iterdir())
 
 
-def test_a_process_that_is_killed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(campaign_pool, "examine", kill_oneself)
-    with pytest.raises(LallianceError, match="a process of the campaign was killed"):
-        campaign_pool.run_campaign(1, 40, 2, lambda _: None)
-
-
-def kill_oneself(_: int, __: range) -> None:
-    __import__("os")._exit(3)
+def test_a_process_that_is_killed_is_told() -> None:
+    with pytest.raises(LallianceError, match="a process that did a part of the work was killed"):
+        list(at_once(os._exit, [(3,), (3,)], 2))

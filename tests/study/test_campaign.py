@@ -12,7 +12,7 @@ from lalliance_study.campaign import Failure, Result, check_fully, examine, is_r
 from lalliance_study.evidence import Evidence, gather
 from lalliance_study.invariants import Violation
 from lalliance_study.random_missions import draw_mission
-from mission_control.campaign_pool import parts, run_campaign
+from mission_control.pool import at_once
 
 FAILING = "lalliance_study.campaign.gather"
 
@@ -29,16 +29,11 @@ def test_a_campaign_is_green() -> None:
 
 
 def test_parallel_and_serial_campaigns_are_the_same() -> None:
-    told: list[int] = []
-    serial = run_campaign(2, 60, 1, lambda result: told.append(result.missions))
-    assert told == [16, 32, 48, 60]
-    assert serial == (examine(2, range(60)), False)
-    assert run_campaign(2, 60, 2, lambda _: None) == serial
-    assert examine(3, range(60)).digest != serial[0].digest
-
-
-def test_parts_are_all_there_once() -> None:
-    assert [number for part in parts(50) for number in part] == list(range(50))
+    serial, parallel = examine(2, range(60)), Result()
+    for part in at_once(examine, [(2, range(first, first + 10)) for first in range(0, 60, 10)], 2):
+        parallel.add(part)
+    assert parallel == serial
+    assert examine(3, range(60)).digest != serial.digest
 
 
 def test_results_add_up_in_any_order() -> None:

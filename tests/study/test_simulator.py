@@ -32,9 +32,8 @@ def run(text: str, *, timing: Timing | None = None, every_step: bool = False) ->
 
 
 def told(simulator: Simulator) -> list[str]:
-    """The log as lines rounded to hundredths, but for the beginning and the processes."""
-    told = [line for line in simulator.log if line.what not in {"trial", "process"}]
-    kept = [line for line in told if line.what != "present" or line.at >= 0.1]
+    """The log as lines rounded to hundredths, once the team is there."""
+    kept = [line for line in simulator.log if line.at > 0.1]
     return [f"{line.at:.2f} {line.who} {line.what} {line.task}: {line.why}" for line in kept]
 
 
@@ -44,6 +43,7 @@ def test_a_robot_dies_and_its_teammate_takes_the_task_over() -> None:
         "0.53 left activate a: free",
         "0.62 right activate b: free",
         "3.05 world fault None: fault: crash of left",
+        "3.05 left process None: killed",
         "3.05 left gone None: left is gone",
         "6.65 right complete b: b completed by right",
         "6.72 right complete b: sensed",
@@ -130,9 +130,10 @@ def test_work_stands_still_while_a_body_is_stuck_and_is_slower_while_it_is_slow(
 
 def test_the_ghost_of_a_hung_robot_yields_to_whoever_took_its_task() -> None:
     simulator = run(PAIR + "faults: [{at: 2, until: 11, robot: left, kind: hang}]\n")
-    assert told(simulator)[7:] == [
+    assert told(simulator)[8:] == [
         "6.82 right takeover a: right takes a from left (silence)",
         "11.05 world fault None: fault is over: hang of left",
+        "11.05 left process None: continued",
         "11.05 left present None: left is there",
         "11.23 left yield a: contender",
         # What it was told while it hung is lost, and it is told again within a second.
