@@ -25,7 +25,6 @@ from lalliance_agents.faults import (
 )
 from lalliance_agents.model.parameters import Architecture, Erratum, Learning
 from lalliance_study.evidence import Evidence, Sight
-from lalliance_study.promises import longest_idleness
 from lalliance_study.simulator import Timing
 from world_server.rules import link_rules
 from world_server.world import REFRESH_PERIOD, STEP
@@ -63,7 +62,7 @@ def is_taken_again(evidence: Evidence) -> Iterator[str]:
             continue
         for robot in mission.able(task):
             until = _taken_by(evidence, robot, at)
-            if robot != victim and until < evidence.ended and _is_free(evidence, robot, task, at, until):
+            if robot != victim and until < evidence.ended and is_free(evidence, robot, task, at, until):
                 if not _stays_away(evidence, victim, at, until):
                     continue
                 taken = [one for one in history.spans if one.task == task and one.since <= until and one.until > at]
@@ -77,18 +76,31 @@ def is_taken_again(evidence: Evidence) -> Iterator[str]:
 def _taken_by(evidence: Evidence, robot: str, at: float) -> float:
     """The instant by which `robot`, if it is free, takes what a teammate was on that fell silent at `at`."""
     own, period = evidence.mission.parameters_of(robot), evidence.mission.control_period
-    born = max([evidence.began, *(one for one in evidence.history.births.get(robot, ()) if one <= at)])
-    begun = max(at, born + own.silence_timeout + period)
-    noticed = max(at + evidence.message_delay + own.silence_timeout, begun) + period
+    silent = at + evidence.message_delay + own.silence_timeout + period
+    return max(silent, bored_by(evidence, robot, at)) + longest_delay(evidence.mission, robot) + 2 * period
+
+
+def bored_by(evidence: Evidence, robot: str, idle_since: float) -> float:
+    """The instant by which nothing but its patience keeps `robot` from a task, if it is idle from `idle_since` on."""
+    own, period = evidence.mission.parameters_of(robot), evidence.mission.control_period
+    births = evidence.history.births.get(robot, ())
+    born = max([evidence.began, *(one for one in births if one <= idle_since)])
+    begun = max(idle_since, born + own.silence_timeout + period) + period
     if own.architecture is Architecture.ALLIANCE:
-        return (
-            noticed + max(own.threshold / own.for_set(task).fast_rate for task in evidence.mission.tasks) + 2 * period
-        )
-    bored = begun + longest_idleness(own) - own.max_delay + period
-    return max(noticed, bored) + own.max_delay + 2 * period
+        return begun
+    return begun + own.boredom_threshold / own.effective_boredom_rate
 
 
-def _is_free(evidence: Evidence, robot: str, task: str, at: float, until: float) -> bool:
+def longest_delay(mission: Mission, robot: str) -> float:
+    """The longest time that motivation takes to grow to the threshold at the fast rate, in seconds."""
+    own = mission.parameters_of(robot)
+    if own.architecture is Architecture.ALLIANCE:
+        return max(own.threshold / own.for_set(task).fast_rate for task in mission.robots[robot].tasks)
+    return own.max_delay
+
+
+def is_free(evidence: Evidence, robot: str, task: str, at: float, until: float) -> bool:
+    """Whether `robot` is idle, senses `task` as open, hears all and runs, from one instant to another."""
     mission, history = evidence.mission, evidence.history
     own = mission.parameters_of(robot)
     literal = any(one is not Erratum.SECOND_PATIENCE and own.is_literal(one) for one in Erratum)
@@ -96,12 +108,12 @@ def _is_free(evidence: Evidence, robot: str, task: str, at: float, until: float)
         not literal
         and history.ran_throughout(robot, at, until)
         and history.idle_throughout(robot, at, until)
-        and not _disturbed(evidence, robot, until)
+        and not is_disturbed(evidence, robot, until)
         and _senses_open(evidence, robot, task, at, until)
     )
 
 
-def _disturbed(evidence: Evidence, robot: str, until: float) -> bool:
+def is_disturbed(evidence: Evidence, robot: str, until: float) -> bool:
     """Whether a fault may have kept `robot` from sensing or hearing before `until`, or delayed what it heard."""
     begun = evidence.began
     return any(

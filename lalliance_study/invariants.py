@@ -13,6 +13,7 @@ from lalliance_agents.model.parameters import SLACK
 from lalliance_study import fault_invariants
 from lalliance_study.accounts import attempts_are_real, credit_is_due, takeovers_are_real, totals_agree
 from lalliance_study.evidence import Choice, Evidence, Sight
+from lalliance_study.limit_invariants import attempts_are_limited, contenders_make_yield, patience_ends
 from lalliance_study.promises import promise, sound
 from world_server.world import REFRESH_PERIOD, STEP
 
@@ -170,6 +171,9 @@ INVARIANTS: dict[str, Callable[[Evidence], Iterator[str]]] = {
         attempts_are_real,
         takeovers_are_real,
         totals_agree,
+        attempts_are_limited,
+        contenders_make_yield,
+        patience_ends,
         fault_invariants.is_taken_again,
         fault_invariants.faults_fire,
         fault_invariants.what_fired_was_there,

@@ -172,7 +172,7 @@ class Member:
         self._lapse_step = max(self._lapse_step, self._step)
         self._beat_step = max(self._beat_step, self._step)
         if not lost:
-            self._listen(now)
+            self._listen(now, each=True)  # no news was looked at meanwhile: any of them may be some
         self._schedule()
         return lost
 
@@ -222,12 +222,12 @@ class Member:
         if self.runs:
             self._listen(now)
 
-    def _listen(self, now: float) -> None:
-        """Take in what has come until `now`."""
+    def _listen(self, now: float, *, each: bool = False) -> None:
+        """Take in what has come until `now`: of rows of refreshes the last, or `each`."""
         mind = self.mind
         for link in self.hears:
             if link.waiting:
-                for spoken in link.take(now, each=self._every_step):
+                for spoken in link.take(now, each=each or self._every_step):
                     mind.handle(spoken.heard, spoken.arrives)
         if mind.wake() < now:
             self._wake(now)

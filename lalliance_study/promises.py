@@ -242,9 +242,5 @@ class _Effort:
         if own.architecture is Architecture.ALLIANCE:
             sets = [own.for_set(task) for task in self._mission.tasks]
             return own.silence_timeout + steps + max(one.patience + own.threshold / one.fast_rate for one in sets)
-        return own.silence_timeout + steps + longest_idleness(own) + max(own.initial_task_time, 2 * self._need)
-
-
-def longest_idleness(own: Parameters) -> float:
-    """How long a robot of L-ALLIANCE may be idle beside a task that nobody is on: boredom, then the delay; in seconds."""
-    return own.boredom_threshold / own.effective_boredom_rate + own.max_delay
+        idle = own.boredom_threshold / own.effective_boredom_rate + own.max_delay
+        return own.silence_timeout + steps + idle + max(own.initial_task_time, 2 * self._need)
