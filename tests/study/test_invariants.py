@@ -270,6 +270,46 @@ def test_a_silent_robots_task_that_nobody_takes() -> None:
     assert told.startswith("one on a was killed at 2.051, and two, which is idle and can do it, has not taken it by 3.")
 
 
+LIMITS = """
+name: limits
+tasks: {a: {}, b: {arrives: 20}}
+robots: {one: {tasks: {a: 2, b: 2}}, two: {tasks: {a: 3}}}
+parameters: {min_delay: 0.1, max_delay: 0.3, ordering: modified_shortest_first}
+knowledge: given
+faults: [{at: 0, robot: one, kind: stuck, task: a, until: 12}, {at: 0, robot: two, kind: stuck, until: 11}]
+deadline: 300
+"""
+
+
+def test_limits_that_are_not_kept() -> None:
+    """One is stuck on a, two loses its patience after 3 s, one yields, takes a again, and so on."""
+    evidence = gather(parse_mission(LIMITS, "limits"))
+    assert judge(evidence) == []
+    told = [
+        f"{line.who} {line.what} {line.why}" for line in evidence.log if line.task == "a" and line.what != "takeover"
+    ]
+    assert told[:3] == ["one activate free", "two activate impatience", "one yield contender"]
+
+    patient = edit_log(evidence, lambda line: None if line.who == "two" and line.task == "a" else line)
+    stays = edit_log(
+        patient, lambda line: None if line.who == "one" and line.task == "a" and line.why != "free" else line
+    )
+    assert "two, which is idle and can do it, has not taken it by" in facts(stays, "patience_ends")
+    assert "one is on a since " in facts(stays, "attempts_are_limited")
+    both = edit_log(evidence, lambda line: line if line.what in {"activate", "process", "trial"} else None)
+    assert "but one has not yielded by" in facts(both, "contenders_make_yield")
+
+
+def test_work_at_a_pace_of_nothing_is_no_work() -> None:
+    """Two tasks that a slow and a stuck robot are said to have done in the time of a sound one."""
+    slow = fresh("rules")
+    slow.summary["tasks"]["a"]["completed_at"] = 9.0
+    assert "of its work done by one" in facts(slow, "credit_is_due")
+    evidence = gather(parse_mission(LIMITS, "limits"))
+    evidence.summary["tasks"]["a"].update(completed_at=9.0, by=["two"])
+    assert "a is complete with 0.0% of its work done" in facts(evidence, "credit_is_due")
+
+
 def test_a_busy_robot_need_not_take_it() -> None:
     evidence = fresh("crash")
     busy = Line(1.0, "two", "activate", "b", "free", None)
