@@ -96,12 +96,12 @@ def _worked(evidence: Evidence, span: Span, since: float, until: float) -> float
     edges = [evidence.began + edge for one in holding for edge in (one.at, one.end) if evidence.live]
     cuts = sorted({since, until, *(edge for edge in edges if since < edge < until)})
     worked = 0.0
-    for start, end in pairwise(cuts):
+    for start, end in pairwise(cuts if since < until else ()):
         pace = 1.0
         for one in holding:
             if evidence.live and evidence.began + one.at <= start and end <= evidence.began + one.end:
                 pace = pace / one.factor if isinstance(one, Slow) else 0.0
-        worked += max(end - start, 0.0) * pace
+        worked += (end - start) * pace
     return worked
 
 
