@@ -24,9 +24,8 @@ from lalliance_agents.faults import (
     robot_of,
 )
 from lalliance_agents.model.parameters import Architecture, Erratum, Learning
-from lalliance_study.evidence import Evidence, Sight
+from lalliance_study.evidence import Choice, Evidence, Sight
 from lalliance_study.simulator import Timing
-from world_server.rules import link_rules
 from world_server.world import REFRESH_PERIOD, STEP
 
 #: From the instant at which something is due in the world to its effect at a robot, in seconds: a step, and messages.
@@ -203,12 +202,25 @@ def _spared(evidence: Evidence, fault: Fault, since: float, until: float) -> flo
     """The chance that no message between robots that share a task is touched."""
     mission, chance = evidence.mission, 1.0
     touched = _least_chance(fault)
-    for rule in link_rules(fault, ""):
+    for senders, receivers in _pairs(fault):
         for sender in mission.robots:
-            mates = [mate for mate in mission.teammates(sender) if fits(mate, rule.receivers)]
-            if mates and fits(sender, rule.senders):
+            mates = [mate for mate in mission.teammates(sender) if fits(mate, receivers)]
+            if mates and fits(sender, senders):
                 chance *= (1 - touched) ** _least_messages(evidence, sender, mates, since, until)
     return chance
+
+
+def _pairs(fault: Fault) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """The globs of senders and receivers whose messages a fault touches."""
+    match fault:
+        case LinkFault() | Partition():
+            return list(fault.pairs())
+        case RadioFault(kind="mute"):
+            return [((fault.robot,), ("*",))]
+        case RadioFault():
+            return [(("*",), (fault.robot,))]
+        case _:
+            return []
 
 
 def _least_messages(evidence: Evidence, sender: str, mates: list[str], since: float, until: float) -> int:
@@ -244,6 +256,31 @@ def _least_chance(fault: Fault) -> float:
             1 - min(fault.loss.bad, fault.loss.good) - bad * max(fault.loss.bad - fault.loss.good, 0.0)
         )
     return 1 - spared * (1 - (fault.loss or 0.0))
+
+
+def what_is_cut_off_is_silent(evidence: Evidence) -> Iterator[str]:
+    """A robot last heard a teammate before the link between them was cut, as long as it is; told where nothing comes late."""
+    faults = evidence.mission.faults
+    if any(isinstance(one, LinkFault) and (one.delay is not None or one.reorder) for one in faults):
+        return
+    cuts = [
+        one for one in faults if isinstance(one, Partition | RadioFault) or (isinstance(one, LinkFault) and one.cut)
+    ]
+    for fault in cuts if evidence.live else ():
+        since, until = evidence.began + fault.at + LAG, evidence.began + fault.end
+        for choice in evidence.choices():
+            heard = choice.at - choice.silent_for
+            if choice.other is not None and since < heard <= choice.at <= until and _touches(fault, choice):
+                yield (
+                    f"{choice.at:.3f} {choice.robot} has heard {choice.other} on {choice.task} at {heard:.3f}, but since "
+                    f"{since - LAG:.3f} there is {describe(fault)}"
+                )
+
+
+def _touches(fault: Fault, choice: Choice) -> bool:
+    """Whether a fault touches what the robot of a choice hears of the other one."""
+    other = choice.other or ""
+    return any(fits(other, senders) and fits(choice.robot, receivers) for senders, receivers in _pairs(fault))
 
 
 def what_fired_was_there(evidence: Evidence) -> Iterator[str]:

@@ -13,7 +13,12 @@ from lalliance_agents.model.parameters import SLACK
 from lalliance_study import fault_invariants
 from lalliance_study.accounts import attempts_are_real, credit_is_due, takeovers_are_real, totals_agree
 from lalliance_study.evidence import Choice, Evidence, Sight
-from lalliance_study.limit_invariants import attempts_are_limited, contenders_make_yield, patience_ends
+from lalliance_study.limit_invariants import (
+    attempts_are_limited,
+    collisions_are_settled,
+    contenders_make_yield,
+    patience_ends,
+)
 from lalliance_study.promises import promise, sound
 from world_server.world import REFRESH_PERIOD, STEP
 
@@ -92,6 +97,20 @@ def leaves_what_is_closed(evidence: Evidence) -> Iterator[str]:
         yield from _stayed(evidence, sight, evidence.ended)
 
 
+def causes_are_sensed(evidence: Evidence) -> Iterator[str]:
+    """A robot that ends a set as complete senses the task as complete, and one that drops it as inapplicable does not."""
+    felt: dict[tuple[str, str], Sight] = {}
+    for note in evidence.notes:
+        if isinstance(note, Sight):
+            felt[note.robot, note.task] = note
+        elif note.cause in {Cause.SENSED, Cause.INAPPLICABLE}:
+            sight = felt.get((note.robot, note.task))
+            expected = "complete" if note.cause == Cause.SENSED else "not applicable"
+            if sight is None or _state(sight) != expected:
+                state = "nothing of it" if sight is None else f"it as {_state(sight)}"
+                yield f"{note.at:.3f} {note.robot} ends {note.task} as {note.cause}, but senses {state}"
+
+
 def _stayed(evidence: Evidence, sight: Sight, until: float) -> Iterator[str]:
     after = sight.at + evidence.mission.control_period + SLACK
     if until > after and evidence.history.ran_throughout(sight.robot, sight.at, after):
@@ -163,6 +182,7 @@ INVARIANTS: dict[str, Callable[[Evidence], Iterator[str]]] = {
         own_tasks_only,
         only_what_is_open,
         leaves_what_is_closed,
+        causes_are_sensed,
         silence_is_long,
         contenders_are_heard,
         completions_are_sensed,
@@ -171,11 +191,13 @@ INVARIANTS: dict[str, Callable[[Evidence], Iterator[str]]] = {
         attempts_are_real,
         takeovers_are_real,
         totals_agree,
+        collisions_are_settled,
         attempts_are_limited,
         contenders_make_yield,
         patience_ends,
         fault_invariants.is_taken_again,
         fault_invariants.faults_fire,
+        fault_invariants.what_is_cut_off_is_silent,
         fault_invariants.what_fired_was_there,
     )
 }

@@ -1,4 +1,4 @@
-"""Invariants of the three limits of Table 1: patience with a teammate, and with oneself with and without a contender.
+"""Invariants of the limits of an attempt: those of Table 1, patience with a teammate and with oneself, and collisions.
 
 What a robot has learned is not in the evidence. So these are told only where it knows just what it was given: in missions of
 one trial with `knowledge: given`, of a robot's first attempt at a task, and of teammates' patience with the first attempt of
@@ -46,6 +46,38 @@ def contenders_make_yield(evidence: Evidence) -> Iterator[str]:
                     f"{span.robot} is on {span.task} since {span.since:.3f} and {other.robot} since {other.since:.3f}, "
                     f"but {span.robot} has not yielded by {until:.3f}"
                 )
+
+
+def collisions_are_settled(evidence: Evidence) -> Iterator[str]:
+    """Of two robots whose first attempts at a task begin within the collision window, the slower one yields within 2 p.
+
+    That is after it has begun and has heard of the other (erratum 15); of two that are as fast the one with the later name is
+    taken for the slower one. Told of L-ALLIANCE, which announces own times; by hand other times are announced.
+    """
+    if not _knows_what_it_is_given(evidence):
+        return
+    mission, period, delay = evidence.mission, evidence.mission.control_period, evidence.message_delay
+    spans = list(_first_attempts(evidence))
+    for slow in spans:
+        for fast in spans:
+            if fast.task != slow.task or _expects(evidence, fast) >= _expects(evidence, slow):
+                continue
+            own = mission.parameters_of(slow.robot)
+            together = abs(slow.since - fast.since) + delay < own.effective_collision_window
+            until = max(slow.since, fast.since) + delay + 2 * period
+            both = together and _lasts(evidence, fast, until) and _lasts(evidence, slow, until)
+            by_hand = any(
+                mission.parameters_of(one.robot).architecture is Architecture.ALLIANCE for one in (fast, slow)
+            )
+            if both and not by_hand and not is_disturbed(evidence, slow.robot, until):
+                yield (
+                    f"{slow.robot} and {fast.robot} began {slow.task} at {slow.since:.3f} and {fast.since:.3f}, and "
+                    f"{slow.robot} has not yielded by {until:.3f}"
+                )
+
+
+def _expects(evidence: Evidence, span: Span) -> tuple[float, str]:
+    return evidence.mission.robots[span.robot].tasks[span.task], span.robot
 
 
 def patience_ends(evidence: Evidence) -> Iterator[str]:

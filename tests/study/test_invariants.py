@@ -179,6 +179,55 @@ def test_a_completion_that_is_not_sensed() -> None:
     assert "two has not sensed by" in facts(evidence, "completions_are_sensed")
 
 
+@pytest.mark.parametrize("cause", ["sensed", "inapplicable"])
+def test_a_set_that_ends_for_another_reason_than_is_sensed(cause: str) -> None:
+    def change(note: Sight | Choice) -> Sight | Choice:
+        return note._replace(complete=cause != "sensed") if isinstance(note, Sight) else note._replace(cause=cause)
+
+    assert f"as {cause}, but senses it as" in facts(edit_notes(fresh("trials"), change), "causes_are_sensed")
+    blind = edit_notes(fresh("trials"), lambda note: None if isinstance(note, Sight) else note)
+    assert "senses nothing of it" in facts(blind, "causes_are_sensed")
+
+
+@pytest.mark.parametrize(
+    "cut",
+    [
+        "{at: 0, partition: [one, two]}",
+        "{at: 0, robot: one, kind: mute}",
+        "{at: 0, robot: two, kind: deaf}",
+        "{at: 0, link: {from: one}, cut: true}",
+    ],
+)
+def test_a_robot_that_hears_what_is_cut_off(cut: str) -> None:
+    heard = fresh("crash")
+    mission = parse_mission(CRASH.replace("faults: [", f"faults: [{cut}, "), "cut")
+    assert "what_is_cut_off_is_silent" not in broken(gather(mission))
+    deaf = replace(heard, mission=mission)
+    deaf.summary["faults"].insert(0, gather(mission).summary["faults"][0])
+    assert "two has heard one on a at" in facts(deaf, "what_is_cut_off_is_silent")
+
+
+COLLISION = """
+name: collision
+tasks: {a: {}}
+robots: {one: {tasks: {a: 3}}, two: {tasks: {a: 3}}}
+parameters: {min_delay: 0.1, max_delay: 0.1}
+knowledge: given
+control_period: 0.01
+deadline: 300
+"""
+
+
+def test_a_collision_that_nobody_yields_to() -> None:
+    """Both begin within one message delay, which happens with some seeds only."""
+    missions = [parse_mission(f"{COLLISION}seed: {seed}\n", "collision") for seed in range(60)]
+    evidence = next(one for one in map(gather, missions) if any(line.why == "collision" for line in one.log))
+    assert judge(evidence) == []
+    assert [line.who for line in evidence.log if line.why == "collision"] == ["two"]
+    both = edit_log(evidence, lambda line: None if line.why == "collision" else line)
+    assert "two has not yielded by" in facts(both, "collisions_are_settled")
+
+
 def test_a_log_that_goes_back_in_time() -> None:
     evidence = fresh("crash")
     assert "is logged after" in facts(replace(evidence, log=evidence.log[::-1]), "time_goes_on")
