@@ -12,6 +12,7 @@ from lalliance_agents.config import Mission
 from lalliance_agents.faults import LinkFault, Slow, Stuck
 from lalliance_agents.model.parameters import SLACK
 from lalliance_study.evidence import Evidence, Span
+from world_server.ledger import MOST_KEPT
 from world_server.world import REFRESH_PERIOD, STEP
 
 #: A body hears what its mind decided after one message delay; what the world tells of it may be a step later.
@@ -128,6 +129,8 @@ def takeovers_are_real(evidence: Evidence) -> Iterator[str]:
     """Each takeover is from a robot that had begun the task to another one that then began it."""
     for one in evidence.summary["takeovers"]:
         attempts = evidence.summary["tasks"][one["task"]]["attempts"]
+        if len(attempts) == MOST_KEPT:
+            continue  # earlier ones were left out of the account
         told = f"takeover of {one['task']} from {one['from']} to {one['to']} at {one['taken_at']:.3f} s"
         if one["from"] == one["to"]:
             yield f"{told}: it is the same robot"
