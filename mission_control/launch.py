@@ -1,14 +1,14 @@
 """Run a mission on this machine: a router, a world server and one process per robot, and their end.
 
-The launcher starts the processes, carries out the world's orders (kill, start), starts its router again if that dies, shows
-what happens, and leaves no process behind. It takes no part in the mission: robots and world talk to one another alone.
+The launcher starts the processes, carries out the world's orders (kill, start), starts its router and its world server again
+if they die, shows what happens, and leaves no process behind. It takes no part in the mission: robots and world talk to one
+another alone.
 """
 
 import asyncio
 import contextlib
-import json
 import signal
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,14 @@ from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
-from lalliance_agents.errors import BusError, LallianceError
+from lalliance_agents.errors import BusError
 from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
-from lalliance_agents.wire.messages import Event, Message
+from lalliance_agents.wire.messages import Event, Message, Status
+from mission_control.keeper import Keeper, LaunchError
 from mission_control.live import Lines
 from mission_control.processes import GRACE, Child
 from world_server.failures import Deed
+from world_server.world import Stage, World
 
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
@@ -33,10 +35,32 @@ LAST_CHANCE = 5.0
 ROUTER_GRACE = 0.3
 #: How often a router that dies is started again.
 ROUTER_RESTARTS = 20
+#: How long the world server of a mission that goes on waits for the robots that are started with it, in real seconds.
+RETURN_PATIENCE = 30.0
 
 
-class LaunchError(LallianceError):
-    """A mission that could not be brought to its end."""
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """Where a mission begins that may have come some way before.
+
+    Attributes:
+        first: the robots to start at once.
+        lost: those that a fault has taken for good, or until the world orders to start them.
+        lives: the latest incarnation of each robot that was there before.
+        goes_on: whether the mission has begun already.
+    """
+
+    first: tuple[str, ...]
+    lost: frozenset[str] = frozenset()
+    lives: dict[str, int] = field(default_factory=dict)
+    goes_on: bool = False
+
+    @classmethod
+    def of(cls, world: World) -> "Beginning":
+        """Where a mission is whose world stands as `world` does; one that is over needs no robot."""
+        killed, joining = world.failures.killed(), world.failures.joining()
+        first = [] if world.over else [robot for robot in world.bodies if robot not in killed | joining]
+        return cls(tuple(first), frozenset(killed), world.ledger.lives(), world.stage is not Stage.WAITING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +70,8 @@ class Plan:
     Attributes:
         path: the mission file, handed to every process.
         mission: what it says.
+        journal: the world server's journal.
+        beginning: where the mission is.
         speed: mission seconds per real second.
         connect: the endpoint of a router that runs already; None: start one.
         listen: where a router of our own listens; None: a free port on this machine.
@@ -54,6 +80,8 @@ class Plan:
 
     path: Path
     mission: Mission
+    journal: Path
+    beginning: Beginning
     speed: float = 1.0
     connect: str | None = None
     listen: str | None = None
@@ -71,7 +99,11 @@ class Plan:
 
     def world(self, endpoint: str) -> list[str]:
         """Arguments of the world server's process."""
-        return ["world", str(self.path), "--json", *self.common(endpoint)]
+        return ["world", str(self.path), "--json", "--journal", str(self.journal), *self.common(endpoint)]
+
+    def first_world(self) -> list[str]:
+        """Further arguments of the world server's first process."""
+        return ["--returning", repr(RETURN_PATIENCE)] if self.beginning.goes_on else []
 
 
 class Launcher:
@@ -90,7 +122,8 @@ class Launcher:
         self._endpoint = free_endpoint() if asked is None else asked
         self._router: Child | None = None
         self._robots: dict[str, Child] = {}
-        self._lives: dict[str, int] = {}
+        self._lives = dict(plan.beginning.lives)
+        self._world = Keeper(plan.world(self._endpoint), plan.first_world(), view, self._on_line)
         self._done: set[int] = set()
         self._tasks: set[asyncio.Task[None]] = set()
         self._robot_ended = asyncio.Event()
@@ -101,22 +134,21 @@ class Launcher:
         Raises:
             BusError: no router could be started or reached.
             LaunchError: the mission could not be brought to its end.
+            UserError: the world server was given something that it cannot use.
         """
-        world: Child | None = None
         try:
             if self._plan.connect is None:
                 await self._start_router()
             async with await open_bus(self._endpoint) as bus:
                 messenger = await self._watch(bus)
-                world = await Child.start("world", self._plan.world(self._endpoint), self._on_line, keeps_output=True)
-                first = [name for name, spec in self._plan.mission.robots.items() if spec.joins == 0]
-                await asyncio.gather(*(self._start_robot(name) for name in first))
-                summary = await self._await_end(world)
+                await self._world.start()
+                await asyncio.gather(*(self._start_robot(name) for name in self._plan.beginning.first))
+                summary = await self._await_end()
                 await self._await_robots()
                 await messenger.close()
             return summary
         finally:
-            await self._end_all(world)
+            await self._end_all()
 
     async def _watch(self, bus: Bus) -> Messenger:
         keys = Keys(self._plan.mission.name)
@@ -130,6 +162,8 @@ class Launcher:
             return
         if isinstance(message, Event) and message.kind == "order":
             self._carry_out(message)
+        elif isinstance(message, Status):
+            self._world.heard(message)
         self._view.take(message, self._clock.now())
 
     def _carry_out(self, order: Event) -> None:
@@ -193,9 +227,9 @@ class Launcher:
             child = self._router = await Child.start("router", arguments, self._on_line, keeps_output=True)
             await child.read_line()
 
-    async def _await_end(self, world: Child) -> dict[str, Any]:
+    async def _await_end(self) -> dict[str, Any]:
         """The summary of the world server, or an error as soon as nobody is left to complete the mission."""
-        ending = asyncio.create_task(world.read_all())
+        ending = asyncio.create_task(self._world.summary())
         deserted = asyncio.create_task(self._await_desertion())
         try:
             await asyncio.wait({ending, deserted}, return_when=asyncio.FIRST_COMPLETED)
@@ -204,7 +238,7 @@ class Launcher:
             if not ending.done():
                 ends = ", ".join(f"{name}: {child.status}" for name, child in self._robots.items())
                 raise LaunchError(f"no robot is left to complete the mission ({ends})")
-            return await self._read_summary(world, ending.result())
+            return ending.result()
         finally:
             ending.cancel()
             deserted.cancel()
@@ -212,21 +246,13 @@ class Launcher:
     async def _await_desertion(self) -> None:
         """Return when every robot has been there, has ended, and will not return."""
         returning = {fault.robot for fault in self._plan.mission.faults if fault.restart}
-        while returning or self._robots.keys() != self._plan.mission.robots.keys() or self._any_robot_runs():
+        expected = self._plan.mission.robots.keys() - self._plan.beginning.lost
+        while returning or expected - self._robots.keys() or self._any_robot_runs():
             await self._robot_ended.wait()
             self._robot_ended.clear()
 
     def _any_robot_runs(self) -> bool:
         return any(child.running for child in self._robots.values())
-
-    async def _read_summary(self, world: Child, output: str) -> dict[str, Any]:
-        """The last line of the world's output; what its environment may have printed stands before."""
-        await world.wait()
-        try:
-            summary: dict[str, Any] = json.loads(output.splitlines()[-1])
-        except (ValueError, IndexError):
-            raise LaunchError(f"the world server ended without a summary ({world.status}): {world.last_line}") from None
-        return summary
 
     async def _await_robots(self) -> None:
         """Robots end by themselves when the mission is over."""
@@ -234,10 +260,9 @@ class Launcher:
             async with asyncio.timeout(2 * GRACE):
                 await asyncio.gather(*(child.wait() for child in self._robots.values()))
 
-    async def _end_all(self, world: Child | None) -> None:
+    async def _end_all(self) -> None:
         for task in list(self._tasks):
             task.cancel()
-        children = [*self._robots.values(), *([world] if world else [])]
-        await asyncio.gather(*(child.end() for child in children))
+        await asyncio.gather(self._world.end(), *(child.end() for child in self._robots.values()))
         if self._router is not None:
             await self._router.end(grace=ROUTER_GRACE)

@@ -225,6 +225,14 @@ class Failures:
                     entry.fire(elapsed)
                 entry.order = None
 
+    def killed(self) -> set[str]:
+        """The robots that a fault in force has killed."""
+        return {robot_of(one.fault) or "" for one in self._on() if isinstance(one.fault, Crash) and not one.must_die}
+
+    def joining(self) -> set[str]:
+        """The robots that are to join the live trial and have not come yet."""
+        return set(self._joining)
+
     def is_hung(self, robot: str) -> bool:
         """Whether the robot's process is to be stopped just now."""
         return any(isinstance(entry.fault, Hang) and robot_of(entry.fault) == robot for entry in self._on())

@@ -84,7 +84,6 @@ class World:
         self._phases = [phase for phase in mission.phases for _ in range(phase.trials)]
         self._phase: Phase = self._phases[0]
         self._environment = self._fresh_environment()
-        self._orders: dict[int, Order] = {}
         self.makespan: float | None = None
 
     def __repr__(self) -> str:
@@ -176,7 +175,7 @@ class World:
         body = self.bodies.get(action.sender)
         if body is None:
             return
-        if (action.trial, action.task) == (self.trial, body.task) and now < body.refreshed + DEAD_MAN:
+        if self.is_refresh(action, now):
             body.fewest = action.fewest
             body.refreshed = max(body.refreshed, now)
             return
@@ -191,6 +190,19 @@ class World:
             if task is not None:
                 self.ledger.began(action.sender, task, self.elapsed)
             self._rest()
+
+    def is_refresh(self, action: Action, now: float) -> bool:
+        """Whether an action at `now` only says once more what its robot's body works on."""
+        body = self.bodies.get(action.sender)
+        if body is None:
+            return False
+        return (action.trial, action.task) == (self.trial, body.task) and now < body.refreshed + DEAD_MAN
+
+    def refreshed(self, robot: str, until: float) -> None:
+        """What `robot` said last was refreshed time and again, the last time at `until`, which may be yet to come."""
+        body = self.bodies.get(robot)
+        if body is not None:
+            body.refreshed = max(body.refreshed, until)
 
     def decided(self, made: DecisionMade, now: float) -> None:
         """A robot reports a decision."""
@@ -207,11 +219,11 @@ class World:
             )
 
     def reported(self, report: LinkReport, now: float) -> None:
-        """A robot reports what it sent and received, and what faults did to what it received."""
-        self.advance(now)
+        """A robot reports what it sent and received, and what faults did to what it received; no time passes by that."""
         if report.sender in self.bodies:
             before = self.ledger.reported(report)
-            self.failures.touched(_newly(report, before), self.elapsed)
+            elapsed = max(self._now, now) - self._began if self.trial else 0.0
+            self.failures.touched(_newly(report, before), elapsed)
 
     def launcher(self, present: bool, now: float) -> None:
         """Whoever holds the robots' processes came or went."""
