@@ -109,12 +109,14 @@ def run(
             f"--speed {speed:g} makes {real:.2g} real seconds of silence a failure; a busy machine may see some that are none"
         )
 
-    async def launch(kept: Path) -> dict[str, Any]:
-        beginning = Beginning.of(recall(kept, mission))
+    def plan(kept: Path) -> Plan:
         own = None if learned is None else learned.resolve()
-        plan = Plan(path.resolve(), mission, kept.resolve(), beginning, speed, connect, listen, own)
+        beginning = Beginning.of(recall(kept, mission))
+        return Plan(path.resolve(), mission, kept.resolve(), beginning, speed, connect, listen, own)
+
+    async def launch(kept: Path) -> dict[str, Any]:
         with _view(mission, console, plain=plain) as view:
-            return await Launcher(plan, view).run()
+            return await Launcher(plan(kept), view).run()
 
     with _kept(journal) as kept:
         summary = _run_until_told(launch(kept))

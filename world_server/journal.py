@@ -39,6 +39,8 @@ _MAGIC = b"SQLite format 3\0"
 #: Where a file says which program it belongs to and which version that was: two numbers in SQLite's own header.
 _HEADER, _VERSION_AT, _APPLICATION_AT = 100, 60, 68
 
+_ANOTHER = "the journal of a world server, or a file that does not exist yet"
+
 _TABLES = (
     "CREATE TABLE mission (name TEXT, seed INTEGER, digest TEXT, incarnation INTEGER)",
     "CREATE TABLE entry (number INTEGER PRIMARY KEY, at REAL, kind TEXT, content BLOB, checksum INTEGER)",
@@ -139,12 +141,14 @@ class Journal:
             self._check_header(header)
 
     def _check_header(self, header: bytes) -> None:
-        another = "the journal of a world server, or a file that does not exist yet"
         if len(header) < _HEADER or not header.startswith(_MAGIC):
-            raise self._wrong("this is no journal", another)
+            raise self._wrong("this is no journal", _ANOTHER)
         version, application = (struct.unpack_from(">I", header, where)[0] for where in (_VERSION_AT, _APPLICATION_AT))
+        self._check_marks(application, version)
+
+    def _check_marks(self, application: int, version: int) -> None:
         if application != APPLICATION:
-            raise self._wrong("this is a database of another program", another)
+            raise self._wrong("this is a database of another program", _ANOTHER)
         if version != VERSION:
             raise self._wrong(
                 f"this journal is of version {version}, and this program knows version {VERSION}",
@@ -161,6 +165,8 @@ class Journal:
             if execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,):
                 self._make(mission)
             execute("COMMIT")
+            [(application,)], [(version,)] = execute("PRAGMA application_id"), execute("PRAGMA user_version")
+            self._check_marks(application, version)
             [(sound,)] = execute("PRAGMA quick_check(1)").fetchall()
             if sound != "ok":
                 raise sqlite3.DatabaseError("it is damaged")

@@ -1,5 +1,6 @@
 """The journal: a world made again from it is the one that was never interrupted, and a file that is not sound is told of."""
 
+import contextlib
 import random
 import shutil
 import sqlite3
@@ -84,10 +85,8 @@ class Driven:
             case "command":
                 faults = ['{"robot": "r1", "kind": "mute"}', '{"robot": "r2", "kind": "stuck"}', "{}"]
                 verb, fault = ("heal", "") if number > 2 else ("inject", faults[number])
-                try:
+                with contextlib.suppress(UserError):
                     history.obey(ChaosCommand(**header, verb=verb, fault=fault, lasts=1.5), now)  # type: ignore[arg-type]
-                except UserError:
-                    pass
             case "begin":
                 history.begin(now)
             case "advance":
@@ -245,21 +244,21 @@ def a_newer_journal(path: Path) -> None:
     database.close()
 
 
+NO_JOURNAL = "this is no journal; expected the journal of a world server, or a file that does not exist yet"
+FOREIGN = NO_JOURNAL.replace("no journal", "a database of another program")
+NEWER = (
+    "this journal is of version 2, and this program knows version 1; expected the program that wrote it, or another file "
+    "for --journal"
+)
+
+
 @pytest.mark.parametrize(
     ("prepare", "sentence"),
     [
-        (a_text, "this is no journal; expected the journal of a world server, or a file that does not exist yet"),
-        (a_short_text, "this is no journal; expected the journal of a world server, or a file that does not exist yet"),
-        (
-            a_database_of_another_program,
-            "this is a database of another program; expected the journal of a world server, or a file that does not "
-            "exist yet",
-        ),
-        (
-            a_newer_journal,
-            "this journal is of version 2, and this program knows version 1; expected the program that wrote it, or "
-            "another file for --journal",
-        ),
+        (a_text, NO_JOURNAL),
+        (a_short_text, NO_JOURNAL),
+        (a_database_of_another_program, FOREIGN),
+        (a_newer_journal, NEWER),
     ],
 )
 def test_what_is_no_journal_is_refused_and_stays_as_it_is(
@@ -342,9 +341,8 @@ def test_a_damaged_file_is_told_of_or_resumes_earlier(tmp_path: Path, seed: int,
     broken.write_bytes(content)
     try:
         world = recall(path, mission_of(BOX))
-    except UserError as error:
-        assert str(error).startswith(f"{path}: ")
-        assert "expected" in str(error)
+    except UserError:
+        assert "expected" in refusal(path, mission_of(BOX)).removeprefix(f"{path}: ")
         return
     assert world.elapsed == round(world.elapsed, 2) <= 2.99
     # A box that is pushed at one end jams at a tenth of the way.
@@ -354,16 +352,13 @@ def test_a_damaged_file_is_told_of_or_resumes_earlier(tmp_path: Path, seed: int,
 def test_a_journal_that_cannot_be_written_any_more_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
     mission = mission_of(BOX)
     with Journal(tmp_path / "journal", mission) as journal:
-        journal._database.execute("PRAGMA max_page_count = 12")
+        journal._database.execute("PRAGMA max_page_count = 6")
         history = History(mission, journal, lambda _: None)
-        with pytest.raises(
-            UserError, match=r"the journal cannot be written \(database or disk is full\); expected room"
-        ):
-            for instant in range(100):
-                for _ in range(100):
-                    history.presence("r0", not history.world.bodies["r0"].present, float(instant))
+        for number in range(1000):
+            history.presence("r0", number % 2 == 0, float(number))
+        for _ in range(2):
+            with pytest.raises(UserError, match=r"cannot be written \(database or disk is full\); expected room, and"):
                 history.commit()
-                committed = instant
         journal._database.execute("PRAGMA max_page_count = 100")
         history.commit()
-    assert len(list(Journal(tmp_path / "journal", mission).entries())) == 100 * (committed + 2)
+        assert len(list(journal.entries())) == 1000
