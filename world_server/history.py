@@ -6,8 +6,8 @@ the last bit, also where an environment's roundings depend on how time is cut.
 
 Two kinds of input come each second from every robot, for as long as the mission lasts, and need no entry each. An action that
 says the same again only prolongs the entry it repeats. A robot's counters replace those that it reported before in the same
-life, unless a fault was seen by those to have fired. Neither changes what the world becomes: the tests hold it against one
-that was never interrupted.
+life and that they include, unless those were the first to show that a fault had fired. Neither changes what the world
+becomes: the tests hold it against one that was never interrupted.
 """
 
 import math
@@ -66,7 +66,7 @@ class History:
         self.now = self.moved = 0.0
         self._next_change: float | None = None
         self._sayings: dict[str, tuple[int, tuple[int, str | None, int]]] = {}
-        self._reports: dict[str, tuple[int, int]] = {}
+        self._reports: dict[str, tuple[LinkReport, int]] = {}
         self._waiting: int | None = None
         if journal is not None:
             self._replay(journal)
@@ -170,14 +170,19 @@ class History:
         self.world.reported(report, now)
         number = self._record(Input.REPORTED, now, report)
         before = self._reports.pop(report.sender, None)
-        if before is not None and before[0] == report.incarnation and self._journal is not None:
+        if before is not None and self._journal is not None and _adds_up(before[0], report):
             self._journal.remove(before[1])
-        if self._fired(report) == fired:
-            self._reports[report.sender] = (report.incarnation, number)
+        if self._fired(report) == fired and self._is_of_faults(report):
+            self._reports[report.sender] = (report, number)
 
     def _fired(self, report: LinkReport) -> int:
         """How many faults have fired; not looked up for a report that cannot change it."""
         return sum(one.fired_at is not None for one in self.world.failures.entries) if report.effects else 0
+
+    def _is_of_faults(self, report: LinkReport) -> bool:
+        """Whether all that the report tells of was done by faults that there are already."""
+        known = {one.name for one in self.world.failures.entries} if report.effects else set()
+        return all(effect.fault in known for effect in report.effects)
 
     def done(self, deed: DeedDone, now: float) -> None:
         """Whoever holds the robots' processes has carried out an order."""
@@ -205,6 +210,13 @@ def recall(path: Path, mission: Mission) -> World:
     """
     with Journal(path, mission) as journal:
         return History(mission, journal, lambda _: None).world
+
+
+def _adds_up(before: LinkReport, after: LinkReport) -> bool:
+    """Whether `after` alone makes the same difference as both: counters of one life that only grow, as they should."""
+    counts = {(one.fault, one.sender): one.count for one in after.effects}
+    grown = all(one.count <= counts.get((one.fault, one.sender), -1) for one in before.effects)
+    return before.incarnation == after.incarnation and grown and len(counts) == len(after.effects)
 
 
 def _sign(present: bool) -> str:

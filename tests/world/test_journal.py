@@ -73,6 +73,8 @@ class Driven:
                 history.decided(DecisionMade(**header, **made, task=task or "a", trial=trial, teammates=[]), now)
             case "reported":
                 names = [entry.name for entry in history.world.failures.entries][: number + 1]
+                # Of a fault that is not yet there, and of one twice: no robot that works says so.
+                names += ["5-mute", "1-crash"] if number == 4 else []
                 effects = [Effect(fault=name, sender="r1", count=number) for name in names]
                 counts = {"sent": 3, "received": number, "dropped": {"stale": 1}, "teammates": {}, "missed": 0}
                 history.reported(LinkReport(**header, **counts, ticks=7, effects=effects), now)
@@ -175,6 +177,25 @@ def test_what_robots_repeat_each_second_does_not_make_the_journal_grow(tmp_path:
         kinds = [entry.kind for entry in journal.entries()]
     assert sorted(kinds) == ["act"] * 3 + ["begin"] + ["presence"] * 3 + ["reported"] * 3
     assert recall(tmp_path / "journal", mission).bodies["r0"].refreshed == 500.0
+
+
+def test_counters_of_every_life_and_when_a_fault_was_first_seen_to_fire_are_kept(tmp_path: Path) -> None:
+    mission = mission_of(BOX.replace("deadline", "  - {at: 1, link: {from: '*', to: r1}, loss: 0.5}\ndeadline"))
+    counts = {"received": 0, "dropped": {}, "teammates": {}, "ticks": 0, "missed": 0}
+    with Journal(tmp_path / "journal", mission) as journal:
+        history = History(mission, journal, lambda _: None)
+        history.presence("r0", True, 0.0)
+        history.begin(0.0)
+        for second in range(1, 9):
+            effects = [Effect(fault="3-link", sender="r0", count=second)]
+            header = {"sender": "r1", "incarnation": second // 4, "seq": second, "at": 0.0}
+            history.reported(LinkReport(**header, **counts, sent=10 * second, effects=effects), float(second))
+        journal.commit()
+        summary = history.world.summary()
+        assert [entry.at for entry in journal.entries() if entry.kind == "reported"] == [1.0, 3.0, 7.0, 8.0]
+    assert recall(tmp_path / "journal", mission).summary() == summary
+    assert summary["messages"]["sent"] == 30 + 70 + 80
+    assert [(one["count"], one["fired_at"]) for one in summary["faults"]][2] == (18, 1.0)
 
 
 def test_a_world_that_waits_for_its_team_does_not_make_the_journal_grow(tmp_path: Path) -> None:
@@ -321,6 +342,47 @@ def test_a_file_that_was_only_just_begun_is_a_new_journal(tmp_path: Path) -> Non
     other.write_bytes(path.read_bytes()[:512])
     shutil.copy(other, tmp_path / "other-journal")
     assert "cannot be used" in refusal(other, mission_of(BOX))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE entry SET at = at + 1 WHERE number = 5",
+        "UPDATE entry SET at = NULL WHERE number = 5",
+        "UPDATE entry SET kind = 'advance' WHERE number = 5",
+        "UPDATE entry SET content = x'00' WHERE number = 5",
+        "UPDATE entry SET content = 'text' WHERE number = 5",
+        "UPDATE entry SET checksum = NULL WHERE number = 5",
+        "UPDATE lasting SET until = until + 1 WHERE number = 5",
+        "UPDATE lasting SET until = 9e999 WHERE number = 5",
+        "UPDATE lasting SET checksum = 0 WHERE number = 5",
+    ],
+)
+def test_an_entry_that_was_altered_is_told_of(tmp_path: Path, change: str) -> None:
+    path = make(tmp_path / "journal")
+    with sqlite3.connect(path) as database:
+        assert database.execute(change).rowcount == 1
+    database.close()
+    assert refusal(path, mission_of(BOX)) == (
+        f"{path}: entry 5 of the journal is damaged; expected a file as this program has left it, or another for --journal"
+    )
+
+
+@pytest.mark.parametrize("kind", ["act", "decided", "reported", "done", "command", "presence", "unknown"])
+def test_an_entry_that_says_nothing_known_is_told_of(tmp_path: Path, kind: str) -> None:
+    with Journal(tmp_path / "journal", mission_of(BOX)) as journal:
+        journal.record(kind, 1.0, b"\xff\xc1")
+        journal.commit()
+    assert "entry 1 of the journal is damaged" in refusal(tmp_path / "journal", mission_of(BOX))
+
+
+@pytest.mark.parametrize("change", ["DELETE FROM mission", "UPDATE mission SET seed = 'x'", "DROP TABLE lasting"])
+def test_a_journal_without_what_every_journal_has_is_told_of(tmp_path: Path, change: str) -> None:
+    path = make(tmp_path / "journal")
+    with sqlite3.connect(path) as database:
+        database.execute(change)
+    database.close()
+    assert refusal(path, mission_of(BOX)).startswith(f"{path}: the journal cannot be ")
 
 
 @pytest.mark.parametrize("seed", range(40))

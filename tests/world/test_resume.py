@@ -243,8 +243,8 @@ async def test_nothing_is_told_before_what_it_is_based_on_is_committed(stage: St
         for number in range(200):
             await asyncio.sleep(draw.uniform(0.0, 0.1))
             stage.act("left", draw.choice(["a", "b", None]))
-            stage.act("right", draw.choice(["b", "c"]))
             for kind in (Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.CHAOS_RULES):
+                stage.act("right", draw.choice(["b", "c"]))
                 assert await stage.bus.query(stage.keys.build(kind), timeout=1.0)
             verb, fault = commands[number % 4]
             header = {"sender": "@operator", "incarnation": 1, "seq": number, "at": 0.0}
