@@ -5,6 +5,7 @@ on with. A mission may run faster than real time; then all its lengths shrink al
 """
 
 import asyncio
+from collections.abc import Callable
 
 
 class MissionClock:
@@ -28,6 +29,10 @@ class MissionClock:
     async def sleep_until(self, instant: float) -> None:
         """Wait until mission time `instant`; an instant that has passed still lets other tasks run."""
         await asyncio.sleep(max(self._real(instant) - self._loop.time(), 0.0))
+
+    def call_at(self, instant: float, callback: Callable[[], None]) -> asyncio.TimerHandle:
+        """Have `callback` called in the loop at mission time `instant`, give or take the rounding of a number."""
+        return self._loop.call_at(self._real(instant), callback)
 
     def _real(self, instant: float) -> float:
         return self._born + (instant - self._since) / self._speed

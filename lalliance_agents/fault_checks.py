@@ -88,22 +88,23 @@ def _contradiction_at_robot(fault: Fault, earlier: Fault) -> str | None:
         # A process that is killed or stopped can be neither killed nor stopped, also not at the instant of its return.
         first, second = sorted((earlier, fault), key=lambda one: one.at)
         if second.at <= first.end:
-            wanted = "no further fault of it" if first.end == math.inf else f"more than {first.end:g} s"
-            return f"at {second.at:g} s robot {robot} is down from an earlier {first.kind}; expected {wanted}"
+            wanted = "no further fault of it" if first.end == math.inf else f"more than {_instant(first.end)}"
+            return f"at {_instant(second.at)} robot {robot} is down from an earlier {first.kind}; expected {wanted}"
     if (
         isinstance(earlier, Crash)
         and not isinstance(fault, Crash | Hang)
         and earlier.at <= fault.at
         and fault.end <= earlier.end
     ):
-        return f"robot {robot} is down from {earlier.at:g} s on; expected a time at which it is there"
+        return f"robot {robot} is down from {_instant(earlier.at)} on; expected a time at which it is there"
     if kind_of(fault) == kind_of(earlier) and fault.overlaps(earlier) and not _stuck_elsewhere(fault, earlier):
         return f"robot {robot} is {kind_of(fault)} already at that time; expected one fault of a kind at a time"
     return None
 
 
-def _within(fault: Fault, earlier: Fault) -> bool:
-    return earlier.at <= fault.at and fault.end <= earlier.end
+def _instant(value: float) -> str:
+    """An instant as people write it: that of an injected fault has more digits than they care for."""
+    return f"{round(value, 2):g} s"
 
 
 def _stuck_elsewhere(fault: Fault, earlier: Fault) -> bool:
@@ -113,17 +114,14 @@ def _stuck_elsewhere(fault: Fault, earlier: Fault) -> bool:
 
 
 def _contradiction_on_links(fault: LinkFault, earlier: LinkFault, robots: list[str]) -> str | None:
-    differing = [name for name, value in fault.aspects().items() if earlier.aspects().get(name, value) != value]
-    if "reorder" in fault.aspects() and "reorder" in earlier.aspects() and fault.held != earlier.held:
-        differing.append("held")
-    if not differing:
+    twice = [name for name in fault.aspects() if name in earlier.aspects()]
+    if not twice:
         return None
     for sender in robots:
         for receiver in robots:
             if sender != receiver and _covers(fault, sender, receiver) and _covers(earlier, sender, receiver):
                 return (
-                    f"another rule sets {differing[0]} from {sender} to {receiver} otherwise at the same time; "
-                    "expected one value"
+                    f"another rule sets {twice[0]} from {sender} to {receiver} at the same time; expected one of them"
                 )
     return None
 

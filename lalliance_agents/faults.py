@@ -237,7 +237,7 @@ class LinkFault(_Timed):
         return self
 
     def aspects(self) -> dict[str, Any]:
-        """What the rule sets, by name; two rules must not set the same aspect of one link differently."""
+        """What the rule sets, by name; no two rules set the same aspect of one link at a time."""
         set_here = {name: getattr(self, name) for name in ("loss", "delay", "duplicate", "reorder")}
         return {name: value for name, value in set_here.items() if value is not None}
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import combinations
 from typing import Any, NamedTuple, get_args, get_origin
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Tag
 from pydantic_core import ErrorDetails
 
 from lalliance_agents.config import ENVIRONMENT_PATTERN, FACTORY_PATTERN, like
@@ -180,7 +180,7 @@ def _tell(error: ErrorDetails, record: type[BaseModel], spots: Mapping[Place, Sp
     if absent or kind == "union_tag_not_found":
         return _missing(loc[-1] if absent else context["discriminator"].strip("'"), place, alternative)
     if kind == "extra_forbidden":
-        return _unknown(place, _fields(record, place[len(prefix) : -1]), alternative)
+        return _unknown(place, _fields(record, place[len(prefix) : -1], loc), alternative)
     if kind == "too_short" and len(spot.value) >= context["min_length"]:
         return None
     if kind == "union_tag_invalid":
@@ -266,22 +266,31 @@ def _place(loc: Place, fixed: int, spots: Mapping[Place, Spot]) -> tuple[Place, 
     return loc, None
 
 
-def _fields(record: type[BaseModel], place: Place) -> list[str]:
-    """The fields that a mapping at `place` of a `record` can have."""
-    return [field.alias or name for found in _records(record, place) for name, field in found.model_fields.items()]
+def _fields(record: type[BaseModel], place: Place, loc: Place) -> list[str]:
+    """The fields that a mapping at `place` of a `record` can have, in the alternative of unions that `loc` names."""
+    found = _records(record, place, loc)
+    return list(dict.fromkeys(field.alias or name for one in found for name, field in one.model_fields.items()))
 
 
-def _records(kind: Any, place: Place) -> Iterator[type[BaseModel]]:
-    """The records that a value at `place` of a `kind` can be; a union has several."""
+def _records(kind: Any, place: Place, loc: Place) -> Iterator[type[BaseModel]]:
+    """The records that a value at `place` of a `kind` can be."""
+    if any(isinstance(mark, Tag) and mark.tag not in loc for mark in getattr(kind, "__metadata__", ())):
+        return
     if isinstance(kind, type) and issubclass(kind, BaseModel):
-        if not place:
+        if not place and _is_named(kind, loc):
             yield kind
         for name, field in kind.model_fields.items() if place else ():
             if (field.alias or name) == place[0]:
-                yield from _records(field.annotation, place[1:])
+                yield from _records(field.annotation, place[1:], loc)
     elif get_origin(kind) not in (dict, list, tuple):
         for part in get_args(kind):
-            yield from _records(part, place)
+            yield from _records(part, place, loc)
     elif place:
         for part in get_args(kind):
-            yield from _records(part, place[1:])
+            yield from _records(part, place[1:], loc)
+
+
+def _is_named(record: type[BaseModel], loc: Place) -> bool:
+    """Whether `loc` names the record by its kind, if it has one that is fixed."""
+    kinds = get_args(record.model_fields["kind"].annotation) if "kind" in record.model_fields else ()
+    return not kinds or any(kind in loc for kind in kinds)

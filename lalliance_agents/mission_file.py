@@ -77,9 +77,27 @@ def read_fault(text: str) -> Fault:
         except ValidationError as error:
             raise holder.error(error, _OneFault) from None
     except MissionError as error:
-        raise MissionError(str(error).removeprefix(f"{source}:1: ")) from None
+        sentence = str(error).removeprefix(f"{source}:1: ").removeprefix("fault.").removeprefix("fault: ")
+        raise MissionError(sentence) from None
     except (ValueError, RecursionError):
         raise MissionError(f"{short(text)!r} is not a fault; expected JSON with the fields of a mission file") from None
+
+
+def read_value(text: str) -> Any:
+    """The plain value that `text` spells as it would stand in one line of a mission file.
+
+    Raises:
+        MissionError: it is not readable, or not as one value.
+    """
+    source = "value"
+    try:
+        document = MissionText(f"{source}: {text}", source).document
+    except MissionError as error:
+        place = re.compile(rf"{source}:1(:\d+)?: ({source}\b[^:]*: )?")
+        raise MissionError(place.sub("", str(error), count=1)) from None
+    if list(document) != [source]:
+        raise MissionError("more than one value; expected it in one line")
+    return document[source]
 
 
 def load_mission_text(path: Path) -> "MissionText":

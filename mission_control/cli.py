@@ -14,13 +14,17 @@ import os
 import signal
 import sys
 import tempfile
-from collections.abc import Coroutine, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 
 from lalliance_agents.errors import LallianceError, UserError
+from mission_control.campaign_command import campaign
+from mission_control.chaos import chaos
+from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
+from mission_control.simulate import simulate
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,9 +34,6 @@ if TYPE_CHECKING:
 
 #: A silence timeout shorter than this, in real seconds, is at the mercy of the machine's scheduling.
 SHORTEST_SILENCE = 0.15
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-
-T = TypeVar("T")
 
 app = typer.Typer(
     name="lalliance",
@@ -43,12 +44,10 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-MissionPath = Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file (YAML).", show_default=False)]
 Speed = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Mission seconds per real second.")]
 Seed = Annotated[int | None, typer.Option(min=0, help="All randomness; default: the mission's own seed.")]
 Connect = Annotated[str, typer.Option(metavar="ENDPOINT", help="The router to connect to.")]
 Parent = Annotated[int | None, typer.Option(hidden=True, help="End when the process with this id does.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output.")]
 Learned = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Where robots keep what they learned; default: nowhere.")
 ]
@@ -119,12 +118,16 @@ def run(
             return await Launcher(plan(kept), view).run()
 
     with _kept(journal) as kept:
-        summary = _run_until_told(launch(kept))
+        summary = run_until_told(launch(kept))
     if as_json:
         typer.echo(json.dumps(summary))
     else:
         show(summary, console)
     raise typer.Exit(0 if summary["complete"] else 1)
+
+
+app.command()(simulate)
+app.command()(campaign)
 
 
 @app.command()
@@ -143,7 +146,7 @@ def router(
             sys.stdout.flush()
             await asyncio.Event().wait()
 
-    _run_until_told(serve())
+    run_until_told(serve())
 
 
 @app.command()
@@ -187,7 +190,7 @@ def world(
                 )
                 return await server.run()
 
-    summary = _run_until_told(serve())
+    summary = run_until_told(serve())
     if as_json:
         typer.echo(json.dumps(summary))
     else:
@@ -248,13 +251,15 @@ def robot(
             )
             return await member.run()
 
-    outcome = _run_until_told(live())
+    outcome = run_until_told(live())
     raise typer.Exit(0 if outcome == "complete" else 1)
 
 
 @app.command()
 def check(path: MissionPath) -> None:
     """Check a mission file and name the first mistake in it."""
+    from mission_control.summary import fault_lines
+
     mission = _load(path, None, part="team")
     for warning in mission.warnings():
         _warn(f"{path}: {warning}")
@@ -266,6 +271,8 @@ def check(path: MissionPath) -> None:
     }
     listed = ", ".join(f"{count} {what}{'' if count == 1 else 's'}" for what, count in parts.items())
     typer.echo(f"{path} is a good mission: {mission.name}, with {listed}")
+    for line in fault_lines(mission.faults):
+        typer.echo(line)
 
 
 @app.command()
@@ -274,6 +281,9 @@ def schema() -> None:
     from mission_control.missions import mission_schema
 
     typer.echo(json.dumps(mission_schema(), indent=2))
+
+
+app.add_typer(chaos, name="chaos")
 
 
 def _load(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":
@@ -335,31 +345,6 @@ def _show_events() -> None:
 
 def _warn(text: str) -> None:
     typer.echo(f"lalliance: warning: {text}", err=True)
-
-
-def _run_until_told(work: Coroutine[Any, Any, T]) -> T:
-    """Run `work`; SIGINT and SIGTERM cancel it and end the process with 128 + the signal's number."""
-    told: list[int] = []
-
-    async def supervised() -> T:
-        task = asyncio.ensure_future(work)
-        loop = asyncio.get_running_loop()
-
-        def stop(number: int) -> None:
-            told.append(number)
-            task.cancel()
-
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, stop, number)
-        return await task
-
-    try:
-        return asyncio.run(supervised())
-    except asyncio.CancelledError:
-        number = signal.Signals(told[0] if told else signal.SIGTERM)
-        if number is signal.SIGINT:
-            typer.echo("lalliance: interrupted", err=True)
-        raise typer.Exit(128 + number) from None
 
 
 def _fail(text: str, status: int) -> NoReturn:

@@ -1,13 +1,12 @@
 """Run a mission on this machine: a router, a world server and one process per robot, and their end.
 
-The launcher starts the processes, carries out the world's orders (kill, start), starts its router and its world server again
-if they die, shows what happens, and leaves no process behind. It takes no part in the mission: robots and world talk to one
+The launcher starts the processes, has the world's orders carried out at them, starts its router and its world server again if
+they die, shows what happens, and leaves no process behind. It takes no part in the mission: robots and world talk to one
 another alone.
 """
 
 import asyncio
 import contextlib
-import signal
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,8 +22,9 @@ from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message, Status
 from mission_control.keeper import Keeper, LaunchError
 from mission_control.live import Lines
+from mission_control.orders import Orders
 from mission_control.processes import GRACE, Child
-from world_server.failures import Deed
+from mission_control.running import announced
 from world_server.world import Stage, World
 
 #: How long the router may take to listen, in seconds.
@@ -45,22 +45,31 @@ class Beginning:
 
     Attributes:
         first: the robots to start at once.
-        lost: those that a fault has taken for good, or until the world orders to start them.
+        lost: those that a fault has killed.
+        may_return: those of them that may be started again: by the mission, or when an operator heals what they died of.
         lives: the latest incarnation of each robot that was there before.
         goes_on: whether the mission has begun already.
     """
 
     first: tuple[str, ...]
     lost: frozenset[str] = frozenset()
+    may_return: frozenset[str] = frozenset()
     lives: dict[str, int] = field(default_factory=dict)
     goes_on: bool = False
 
     @classmethod
     def of(cls, world: World) -> "Beginning":
         """Where a mission is whose world stands as `world` does; one that is over needs no robot."""
-        killed, joining = world.failures.killed(), world.failures.joining()
+        failures = world.failures
+        killed, joining = failures.killed(), failures.joining()
         first = [] if world.over else [robot for robot in world.bodies if robot not in killed | joining]
-        return cls(tuple(first), frozenset(killed), world.ledger.lives(), world.stage is not Stage.WAITING)
+        return cls(
+            first=tuple(first),
+            lost=frozenset(killed),
+            may_return=frozenset(killed - failures.killed_for_good()),
+            lives=world.ledger.lives(),
+            goes_on=world.stage is not Stage.WAITING,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +133,9 @@ class Launcher:
         self._robots: dict[str, Child] = {}
         self._lives = dict(plan.beginning.lives)
         self._world = Keeper(plan.world(self._endpoint), plan.first_world(), view, self._on_line)
-        self._done: set[int] = set()
+        self._messenger: Messenger | None = None
+        self._orders = Orders(plan.mission, self._robots, self._restart, self._report)
+        self._orders.may_return |= plan.beginning.may_return
         self._tasks: set[asyncio.Task[None]] = set()
         self._robot_ended = asyncio.Event()
 
@@ -139,48 +150,46 @@ class Launcher:
         try:
             if self._plan.connect is None:
                 await self._start_router()
+            name = self._plan.mission.name
             async with await open_bus(self._endpoint) as bus:
-                messenger = await self._watch(bus)
-                await self._world.start()
-                await asyncio.gather(*(self._start_robot(name) for name in self._plan.beginning.first))
-                summary = await self._await_end()
-                await self._await_robots()
-                await messenger.close()
-            return summary
+                with announced(name, self._endpoint):
+                    self._view.locate(name, self._endpoint)
+                    return await self._conduct(bus)
         finally:
             await self._end_all()
 
+    async def _conduct(self, bus: Bus) -> dict[str, Any]:
+        messenger = await self._watch(bus)
+        await self._world.start()
+        await asyncio.gather(*(self._start_robot(name) for name in self._plan.beginning.first))
+        summary = await self._await_end()
+        await self._await_robots()
+        await messenger.close()
+        return summary
+
     async def _watch(self, bus: Bus) -> Messenger:
         keys = Keys(self._plan.mission.name)
-        messenger = Messenger(bus, keys, LAUNCHER, 1, self._clock.now)
+        messenger = self._messenger = Messenger(bus, keys, LAUNCHER, 1, self._clock.now)
         for kind in (Kind.EVENT, Kind.STATUS, Kind.DECISION, Kind.MOTIVATION):
             await messenger.listen(keys.build(kind), self._take)
+        await bus.announce_presence(keys.build(Kind.LAUNCHER))
         return messenger
 
     def _take(self, _: Key, message: Message) -> None:
         if message.sender != WORLD and message.sender not in self._plan.mission.robots:
             return
         if isinstance(message, Event) and message.kind == "order":
-            self._carry_out(message)
+            self._orders.take(message)
         elif isinstance(message, Status):
             self._world.heard(message)
         self._view.take(message, self._clock.now())
 
-    def _carry_out(self, order: Event) -> None:
-        """Do what the world orders, each order once, and nothing that the mission does not foresee."""
-        number, deed, robot = order.details.get("number"), order.details.get("deed"), order.robot
-        if not isinstance(number, int) or number in self._done or robot not in self._plan.mission.robots:
-            return
-        faults = [fault for fault in self._plan.mission.faults if fault.robot == robot]
-        child = self._robots.get(robot)
-        if deed == Deed.KILL and faults and child is not None:
-            self._done.add(number)
-            child.send_signal(signal.SIGKILL)
-        elif deed == Deed.START and not (child is not None and child.running):
-            returns = any(fault.restart for fault in faults)
-            if returns or self._plan.mission.robots[robot].joins > 0:
-                self._done.add(number)
-                self._spawn(self._start_robot(robot))
+    def _restart(self, robot: str) -> None:
+        self._spawn(self._start_robot(robot))
+
+    def _report(self, order: int) -> None:
+        if self._messenger is not None:
+            self._messenger.send(Kind.CHAOS_DEED, number=order)
 
     def _spawn(self, work: Any) -> None:
         task = asyncio.create_task(work)
@@ -191,6 +200,7 @@ class Launcher:
         self._lives[name] = self._lives.get(name, 0) + 1
         child = await Child.start(name, self._plan.robot(name, self._lives[name], self._endpoint), self._on_line)
         self._robots[name] = child
+        self._orders.returned(name)
         self._spawn(self._observe(child))
 
     async def _observe(self, child: Child) -> None:
@@ -232,33 +242,36 @@ class Launcher:
         ending = asyncio.create_task(self._world.summary())
         deserted = asyncio.create_task(self._await_desertion())
         try:
-            await asyncio.wait({ending, deserted}, return_when=asyncio.FIRST_COMPLETED)
-            if not ending.done():
-                await asyncio.wait({ending}, timeout=LAST_CHANCE)
-            if not ending.done():
-                ends = ", ".join(f"{name}: {child.status}" for name, child in self._robots.items())
-                raise LaunchError(f"no robot is left to complete the mission ({ends})")
+            while not ending.done():
+                await asyncio.wait({ending, deserted}, return_when=asyncio.FIRST_COMPLETED)
+                if not ending.done():
+                    await asyncio.wait({ending}, timeout=LAST_CHANCE)
+                if not ending.done() and self._is_deserted():
+                    ends = ", ".join(f"{name}: {child.status}" for name, child in self._robots.items())
+                    raise LaunchError(f"no robot is left to complete the mission ({ends})")
+                if deserted.done():  # and a robot has come back since
+                    deserted = asyncio.create_task(self._await_desertion())
             return ending.result()
         finally:
             ending.cancel()
             deserted.cancel()
 
     async def _await_desertion(self) -> None:
-        """Return when every robot has been there, has ended, and will not return."""
-        returning = {fault.robot for fault in self._plan.mission.faults if fault.restart}
-        expected = self._plan.mission.robots.keys() - self._plan.beginning.lost
-        while returning or expected - self._robots.keys() or self._any_robot_runs():
+        while not self._is_deserted():
             await self._robot_ended.wait()
             self._robot_ended.clear()
 
-    def _any_robot_runs(self) -> bool:
-        return any(child.running for child in self._robots.values())
+    def _is_deserted(self) -> bool:
+        """Whether every robot has been there, has ended, and will not return; one that is stopped is still there."""
+        all_came = self._robots.keys() | self._plan.beginning.lost == self._plan.mission.robots.keys()
+        return all_came and not self._orders.may_return and not any(child.running for child in self._robots.values())
 
     async def _await_robots(self) -> None:
-        """Robots end by themselves when the mission is over."""
+        """Robots end by themselves when the mission is over, but for those that are stopped."""
+        going = [child.wait() for child in self._robots.values() if not child.stopped]
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(2 * GRACE):
-                await asyncio.gather(*(child.wait() for child in self._robots.values()))
+                await asyncio.gather(*going)
 
     async def _end_all(self) -> None:
         for task in list(self._tasks):

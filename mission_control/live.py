@@ -47,6 +47,10 @@ class Lines:
         if line is not None:
             self.say(line)
 
+    def locate(self, mission: str, endpoint: str) -> None:
+        """Show where the mission's bus is."""
+        self.say(f"mission {mission} runs on the bus at {endpoint}")
+
     def say(self, text: str) -> None:
         """Show a remark that is no message of the mission."""
         self._console.print(printable(text), highlight=False, markup=False, soft_wrap=True)
@@ -68,6 +72,7 @@ class LiveView(Lines):
         super().__init__(console)
         self._mission = mission
         self._name_width = max(map(len, [*mission.robots, *mission.tasks]))
+        self._endpoint = ""
         self._live = Live(console=console, get_renderable=self._render, refresh_per_second=5, screen=True)
 
     def __enter__(self) -> Self:
@@ -85,6 +90,11 @@ class LiveView(Lines):
         """Put a message into the picture; it shows at the next redraw."""
         self._picture.take(message, now)
 
+    def locate(self, mission: str, endpoint: str) -> None:
+        """Show where the mission's bus is, for as long as the view lasts."""
+        del mission
+        self._endpoint = endpoint
+
     def say(self, text: str) -> None:
         """Show a remark among the events."""
         self._picture.events.append(printable(text))
@@ -93,15 +103,25 @@ class LiveView(Lines):
         height = self._console.size.height
         parts: list[Callable[[int], RenderableType]] = [self._headline, self._robots, self._tasks]
         rows = [1, min(len(self._mission.robots), height // 3) + 2, min(len(self._mission.tasks), height // 3) + 2]
+        if self._picture.faults:
+            parts.insert(1, self._faults)
+            rows.insert(1, 1)
         left = max(height - sum(rows) - 2, 3)
         return Group(*(part(row) for part, row in zip(parts, rows, strict=True)), self._events(left))
 
     def _headline(self, _: int) -> Text:
         status = self._picture.status
         if status is None:
-            return Text(f"{self._mission.name}: starting {len(self._mission.robots)} robots …", style="bold")
-        trial = f", trial {status.trial} ({status.learning} learning)" if status.trials > 1 else ""
-        return Text(f"{self._mission.name}: {status.mission}, {status.elapsed:.1f} s{trial}", style="bold")
+            line = Text(f"{self._mission.name}: starting {len(self._mission.robots)} robots …", style="bold")
+        else:
+            trial = f", trial {status.trial} ({status.learning} learning)" if status.trials > 1 else ""
+            line = Text(f"{self._mission.name}: {status.mission}, {status.elapsed:.1f} s{trial}", style="bold")
+        return line.append(f"   {self._endpoint}", style="not bold dim")
+
+    def _faults(self, _: int) -> Text:
+        return Text(
+            f"in force: {'; '.join(map(printable, self._picture.faults))}", "red", no_wrap=True, overflow="ellipsis"
+        )
 
     def _robots(self, rows: int) -> Table:
         table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False)

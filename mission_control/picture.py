@@ -20,6 +20,8 @@ class Picture:
     lead: float = 0.0
     """How far the time since the trial began is ahead of the operator's own mission time, in seconds."""
     motivations: dict[str, Motivations] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+    """Those in force."""
     events: deque[str] = field(default_factory=lambda: deque(maxlen=KEPT_EVENTS))
 
     def take(self, message: Message, now: float) -> str | None:
@@ -31,7 +33,8 @@ class Picture:
                 self.lead = message.elapsed - now
             case Motivations():
                 self.motivations[message.sender] = message
-            case Event() if message.kind != "order" or message.details.get("deed") == "kill":
+            case Event() if message.kind != "order":  # which follows from an event that is told
+                self._note_fault(message)
                 line = f"{message.elapsed:7.1f} s  {message.text}"
             case DecisionMade():
                 line = f"{max(now + self.lead, 0.0):7.1f} s  {describe(message)}"
@@ -40,6 +43,16 @@ class Picture:
         if line is not None:
             self.events.append(line)
         return line
+
+    def _note_fault(self, event: Event) -> None:
+        if event.kind == "trial":
+            self.faults.clear()
+        elif event.kind == "fault":
+            _, begins, fault = event.text.partition("fault: ")
+            if begins:
+                self.faults.append(fault)
+            elif (over := event.text.removeprefix("fault is over: ")) in self.faults:
+                self.faults.remove(over)
 
     def working(self, task: str) -> list[str]:
         """The robots whose bodies work on `task`."""

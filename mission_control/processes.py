@@ -60,6 +60,8 @@ class Child:
         streams = [process.stderr] if keeps_output else [process.stderr, process.stdout]
         self._readers = [asyncio.create_task(self._read(stream)) for stream in streams if stream is not None]
         self.last_line = ""
+        #: Whether it was stopped by `stop` and not continued since.
+        self.stopped = False
 
     @classmethod
     async def start(
@@ -95,7 +97,7 @@ class Child:
         """Whether it runs, or how it ended."""
         code = self._process.returncode
         if code is None:
-            return "running"
+            return "stopped" if self.stopped else "running"
         return f"killed by {_signal_name(-code)}" if code < 0 else f"exit status {code}"
 
     @property
@@ -131,9 +133,21 @@ class Child:
             with contextlib.suppress(ProcessLookupError):
                 self._process.send_signal(number)
 
+    def stop(self) -> None:
+        """Have it make no further step until it is continued."""
+        self.send_signal(signal.SIGSTOP)
+        self.stopped = self.running
+
+    def resume(self) -> None:
+        """Let it go on where it was stopped."""
+        self.send_signal(signal.SIGCONT)
+        self.stopped = False
+
     async def end(self, *, grace: float = GRACE) -> None:
         """Ask it to end, and kill it if it does not within the grace; what it has started itself ends with it."""
-        self.send_signal(signal.SIGTERM)
+        # Who is stopped hears no request; whom somebody else has stopped hears it on being continued.
+        self.send_signal(signal.SIGKILL if self.stopped else signal.SIGTERM)
+        self.send_signal(signal.SIGCONT)
         try:
             async with asyncio.timeout(grace):
                 await self._process.wait()

@@ -1,11 +1,17 @@
-"""The summary of a mission as a person reads it."""
+"""The summary of a mission as a person reads it, and its faults while it still runs."""
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
+
+from lalliance_agents.faults import Fault, describe
+
+#: Faults that are shown one by one: the latest.
+SHOWN_FAULTS = 30
 
 
 def show(summary: Mapping[str, Any], console: Console) -> None:
@@ -80,10 +86,61 @@ def _instant(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f} s"
 
 
+def fault_lines(faults: Sequence[Fault]) -> Iterator[str]:
+    """The faults that a mission plans, one line for each."""
+    for fault in faults:
+        until = "" if fault.end == math.inf else f", until {fault.end:g} s"
+        yield f"  at {fault.at:g} s{until}: {describe(fault)}"
+
+
+def _faults(faults: Sequence[Mapping[str, Any]]) -> Iterator[Text]:
+    if len(faults) > SHOWN_FAULTS:
+        idle = sum(not fault["fired"] for fault in faults[:-SHOWN_FAULTS])
+        yield Text(f"Faults: {len(faults) - SHOWN_FAULTS} earlier ones are not listed, {idle} of them never fired")
+    for fault in faults[-SHOWN_FAULTS:]:
+        if fault["state"] == "waiting":
+            outcome = f"never began, it was due at {fault['at']:.1f} s"
+        else:
+            outcome = _effect(fault) or "never fired"
+        yield Text(f"Fault: {fault['text']}: {outcome}", style="" if fault["fired"] else "yellow")
+
+
+#: Faults of which every message that they touch is counted.
+_COUNTED = {"link", "partition", "mute", "deaf", "blind"}
+
+
+def _effect(fault: Mapping[str, Any]) -> str:
+    """What a fault has done; empty: nothing so far."""
+    if not fault["fired"]:
+        return ""
+    if fault["kind"] not in _COUNTED:
+        return f"fired at {fault['fired_at']:.1f} s"
+    messages = f"{fault['count']} message{'' if fault['count'] == 1 else 's'}"
+    return f"fired, {messages}, first at {fault['fired_at']:.1f} s"
+
+
+_STYLES = {"waiting": "dim", "on": "red", "over": ""}
+
+
+def faults_table(faults: Sequence[Mapping[str, Any]]) -> Table:
+    """The faults of a mission that runs, as the world tells them."""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for column in ("name", "fault"):
+        table.add_column(column)
+    for column in ("since", "until"):
+        table.add_column(column, justify="right")
+    for column in ("state", "effect"):
+        table.add_column(column)
+    for fault in faults:
+        until = "healed" if fault["until"] is None else f"{fault['until']:.1f} s"
+        state = Text(fault["state"], style=_STYLES.get(fault["state"], ""))
+        effect = _effect(fault) or ("" if fault["state"] == "waiting" else "none so far")
+        table.add_row(fault["name"], Text(fault["text"]), f"{fault['at']:.1f} s", until, state, effect)
+    return table
+
+
 def _notes(summary: Mapping[str, Any]) -> Iterator[Text]:
-    for fault in summary["faults"]:
-        fired = f"fired at {fault['fired_at']:.1f} s" if fault["fired"] else "never fired"
-        yield Text(f"Fault: {fault['kind']} of {fault['robot']} {fired}", style="" if fault["fired"] else "yellow")
+    yield from _faults(summary["faults"])
     if len(summary["trials"]) > 1:
         times = [f"{time:.1f}" for time in summary["trials"]]
         shown = times if len(times) <= 12 else [*times[:5], "…", *times[-5:]]
@@ -92,5 +149,7 @@ def _notes(summary: Mapping[str, Any]) -> Iterator[Text]:
     dropped = ", ".join(f"{count} {reason}" for reason, count in messages["dropped"].items()) or "none"
     yield Text(f"Messages: {messages['sent']} sent, {messages['received']} received, dropped: {dropped}")
     yield Text(f"Control periods: {control['periods']} kept, {control['missed']} missed")
-    if control["missed"] > 0.01 * control["periods"]:
+    # A robot that hung has missed its periods whatever the machine.
+    hung = any(fault["kind"] == "hang" and fault["fired"] for fault in summary["faults"])
+    if control["missed"] > 0.01 * control["periods"] and not hung:
         yield Text("Many control periods were missed: this machine is too slow for this team at this speed", "yellow")

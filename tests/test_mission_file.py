@@ -224,6 +224,10 @@ ADDED = {
     "did you mean 'r2'?",
     "faults: [{kind: crsh, robot: r1, at: 1}]": "faults.0.kind: 'crsh' is not allowed; expected one of crash, "
     "hang, stuck, slow, mute, deaf, blind; did you mean 'crash'?",
+    "faults: [{kind: slow, robot: r1, at: 1, factor: 2, loss: 0.1}]": "faults.0.loss: unknown field; expected one of at, "
+    "until, kind, robot, factor",
+    "faults: [{link: {}, robot: r1, at: 1, cut: yes}]": "faults.0.robot: unknown field; expected one of at, until, link, "
+    "loss, delay, duplicate, reorder, held, cut",
     "faults: [{kind: crash, robot: r1, at: 600}]": "faults.0.at: 600 s is not before the mission's deadline; "
     "expected less than 600 s",
     "faults: [{kind: crash, robot: r1, at: 1, restart: 'yes'}]": "faults.0.restart: 'yes' is text; "
@@ -260,7 +264,7 @@ ADDED = {
     "first one 2 s",
     "faults: [{at: 3, link: {}, delay: {unifrm: [1, 2]}}]": "faults.0.delay.unifrm: unknown field; did you mean 'uniform'?",
     "faults: [{at: 3, link: {}, loss: 0.5}, {at: 5, link: {to: r2}, loss: 0.3}]": "faults.1: another rule sets loss from r1 "
-    "to r2 otherwise at the same time; expected one value (see faults.0)",
+    "to r2 at the same time; expected one of them (see faults.0)",
     "faults: [{at: 3, partition: [r1]}]": "faults.0.partition: ['r1'] is not allowed; expected 2 or more entries",
     "faults: [{at: 3, partition: [r1, [r2, 'r*']]}]": "faults.0.partition.1: r1 is in two groups of the partition; expected "
     "it in one",

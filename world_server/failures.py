@@ -186,8 +186,13 @@ class Failures:
         entry = self._add(timed, elapsed, ends)
         return entry, self.advance(elapsed)
 
-    def heal(self, name: str, elapsed: float) -> list[Change]:
-        """End the fault `name`, or all that are in force if it is empty.
+    def heal(self, name: str, elapsed: float, *, killing: bool) -> tuple[list[str], list[Change]]:
+        """End the fault `name`, or all that are in force if it is empty; which they are, and what has changed already.
+
+        Args:
+            name: which.
+            elapsed: the present instant, in seconds.
+            killing: whether somebody may be killing a process just now: its crash is over once it was seen to be dead.
 
         Raises:
             UserError: there is no such fault in force.
@@ -198,12 +203,14 @@ class Failures:
             raise UserError(f"no fault {name!r} is in force; expected one of: {known}")
         for entry in on:
             entry.ends = elapsed
-        return [self._end(entry) for entry in on]
+        over = [self._end(entry) for entry in on if not (killing and entry.must_die)]
+        return [entry.name for entry in on], over
 
     def orders(self, elapsed: float) -> list[Order]:
-        """All orders that are due and not confirmed."""
+        """All orders that are due and not confirmed, in the order in which they became due (joins first)."""
         due = [entry.order for entry in self.entries if entry.order is not None]
-        return due + [order for robot, order in self._joining.items() if reaches(elapsed, self._joins[robot])]
+        due += [order for robot, order in self._joining.items() if reaches(elapsed, self._joins[robot])]
+        return sorted(due, key=lambda order: order.number)
 
     def done(self, number: int, elapsed: float) -> None:
         """Whoever holds the processes has carried out an order."""
@@ -229,9 +236,21 @@ class Failures:
         """The robots that a fault in force has killed."""
         return {robot_of(one.fault) or "" for one in self._on() if isinstance(one.fault, Crash) and not one.must_die}
 
+    def killed_for_good(self) -> set[str]:
+        """The robots that the mission itself has killed, which does not mean to start them again."""
+        scheduled = [one for one in self.entries[: len(self._mission.faults)] if one.state is State.ON]
+        return self.killed() & {
+            robot_of(one.fault) or "" for one in scheduled if isinstance(one.fault, Crash) and one.ends == math.inf
+        }
+
     def joining(self) -> set[str]:
         """The robots that are to join the live trial and have not come yet."""
         return set(self._joining)
+
+    @property
+    def hold_up(self) -> bool:
+        """Whether any body may be held up just now."""
+        return any(isinstance(entry.fault, Hang | Stuck | Slow) for entry in self._on())
 
     def is_hung(self, robot: str) -> bool:
         """Whether the robot's process is to be stopped just now."""
@@ -281,7 +300,9 @@ class Failures:
 
 
 def _timed(fault: Fault, begins: float, ends: float) -> Fault:
-    return fault.model_copy(update={"at": begins, "until": None if ends == math.inf else ends})
+    times = {"at": begins, "until": None if ends == math.inf else ends}
+    # Whoever says how long a crash lasts means that the robot returns.
+    return fault.model_copy(update=times | ({"restart": ends < math.inf} if isinstance(fault, Crash) else {}))
 
 
 def _holds_up(fault: Fault, robot: str, task: str) -> bool:

@@ -26,14 +26,12 @@ from world_server.environments.base import TaskView
 from world_server.failures import Order
 from world_server.history import History
 from world_server.journal import Journal
-from world_server.world import Happening
+from world_server.world import REFRESH_PERIOD, STEP, Happening
 
 _log = logging.getLogger(__name__)
 
-#: Time between two steps, in mission seconds, and at least in real ones.
-STEP = 0.05
+#: Least time between two steps, in real seconds.
 LEAST_STEP = 0.01
-REFRESH_PERIOD = 1.0
 #: How long to listen at the start for another world server of the mission, in real seconds.
 RIVAL_TIMEOUT = 0.5
 STATUS_PERIOD = 0.25

@@ -22,6 +22,9 @@ from world_server.environments.base import Environment, TaskView, Work
 from world_server.failures import Change, Failures, Order
 from world_server.ledger import Ledger
 
+#: Time between two looks of a world server at its world, and between two refreshes of what it publishes, in seconds.
+STEP = 0.05
+REFRESH_PERIOD = 1.0
 #: A body stops when its action was not refreshed for this long, in seconds.
 DEAD_MAN = 2.5
 #: Time between two trials, in seconds: everybody can sense the end of the one before the next begins.
@@ -93,6 +96,11 @@ class World:
     def elapsed(self) -> float:
         """Time since the trial began, in seconds."""
         return self._now - self._began if self.trial else 0.0
+
+    @property
+    def began(self) -> float:
+        """When the trial began, as an instant of whoever hands in the time."""
+        return self._began
 
     @property
     def learning(self) -> str:
@@ -256,6 +264,8 @@ class World:
                 f"{describe(fault)}: nobody here can reach the robots' processes; expected a mission started by "
                 "`lalliance run`, or a fault of another kind"
             )
+        if isinstance(fault, Crash | Hang) and fault.robot in self.bodies and not self.bodies[fault.robot].present:
+            raise UserError(f"{describe(fault)}: {fault.robot} is not there; expected a robot whose process runs")
         entry, changes = self.failures.inject(fault, self.elapsed, lasts)
         self._changed(changes)
         until = "until it is healed" if entry.ends == math.inf else f"until {entry.ends:.1f} s"
@@ -268,9 +278,9 @@ class World:
             UserError: there is no such fault in force.
         """
         self.advance(now)
-        changes = self.failures.heal(name, self.elapsed)
+        healed, changes = self.failures.heal(name, self.elapsed, killing=self.has_launcher)
         self._changed(changes)
-        return f"healed {', '.join(change.entry.name for change in changes)}" if changes else "no fault is in force"
+        return f"healed {', '.join(healed)}" if healed else "no fault is in force"
 
     @property
     def _where(self) -> str:
@@ -325,7 +335,7 @@ class World:
 
     def _actions(self) -> dict[str, Work]:
         working = {robot: body.task for robot, body in self.bodies.items() if body.task is not None and body.present}
-        if not self.live:
+        if not (self.live and self.failures.hold_up):
             return {robot: Work(task) for robot, task in working.items()}
         return {
             robot: Work(task, self.failures.pace(robot, task))
@@ -350,16 +360,17 @@ class World:
 
     def _work(self, until: float) -> None:
         actions, since = self._actions(), self._now
-        if self.live and until > since:
+        if self.live and until > since and self.failures.hold_up:
             for robot, work in actions.items():
                 self.failures.worked(robot, work.task, self.elapsed)
-        for done in self._environment.step(until - self._now, actions):
+        completions = self._environment.step(until - self._now, actions)
+        for done in completions:
             at = self._now + done.after - self._began
             self.ledger.completed(done.task, done.by, at)
             text = f"{done.task} completed by {' and '.join(done.by)}"
             self._tell(Happening("complete", text, at, done.by[0] if done.by else None, done.task))
         self._now = until
-        if all(view.complete for view in self.tasks().values()):
+        if (completions or since == self._began) and self._environment.is_complete:
             # The trial ends with its last task, however far this step went beyond it.
             self._now = min(max(since, self._began + (self.ledger.last_completion or 0.0)), until)
             self._end_trial()

@@ -3,6 +3,7 @@
 from collections import Counter
 
 from lalliance_agents.agent import translate
+from lalliance_agents.bus.faulty import FaultyBus
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.model.mind import Mind
 from lalliance_agents.wire.keys import Kind
@@ -14,10 +15,12 @@ class Reports:
 
     Args:
         messenger: what is counted, and what carries the reports.
+        bus: what counts the messages that faults touched before the messenger saw them.
     """
 
-    def __init__(self, messenger: Messenger) -> None:
+    def __init__(self, messenger: Messenger, bus: FaultyBus) -> None:
         self._messenger = messenger
+        self._bus = bus
         self._received: Counter[str] = Counter()
         self._ticks = 0
         self._missed = 0
@@ -42,10 +45,11 @@ class Reports:
             Kind.LINK,
             sent=self._messenger.sent,
             received=self._messenger.received,
-            dropped=dict(self._messenger.dropped),
+            dropped=dict(self._messenger.dropped + self._bus.dropped),
             teammates={
                 robot: Reception(received=count, silence=silences.get(robot)) for robot, count in self._received.items()
             },
+            effects=self._bus.effects(),
             ticks=self._ticks,
             missed=self._missed,
             final=final,

@@ -3,29 +3,28 @@
 A `Robot` puts a mind, a messenger and a body together in one event loop. Messages become events; once per control period
 the mind ticks, and its commands go to the radio and the body. Once a second the robot refreshes what others keep of it. It
 decides nothing itself, and nothing that it receives can end it: it ends when the world says that the mission is over, or
-when it is cancelled.
+when it is cancelled. It hears through the faults of links that the world has put in force.
 """
 
 import asyncio
 import logging
-import random
 from collections.abc import Iterable
 from typing import Any, Literal
 
 from lalliance_agents.agent import translate
 from lalliance_agents.agent.behavior import BehaviorSet, complete_repertoire, described
+from lalliance_agents.agent.briefing import chance_of, new_mind, roster, tasks_of
 from lalliance_agents.agent.catalog import Catalog, fresh_incarnation
 from lalliance_agents.agent.performer import Performer
 from lalliance_agents.agent.reports import Reports
 from lalliance_agents.agent.team import Team
 from lalliance_agents.bus.base import Bus, Delivery, Publication, Registration, Sample
+from lalliance_agents.bus.faulty import FaultyBus
 from lalliance_agents.bus.messenger import Messenger, Receiver
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import MissionError
-from lalliance_agents.model.events import Activate, Announce, BodyFailed, Command, Deactivate, RosterKnown, TrialStarted
-from lalliance_agents.model.mind import Mind
-from lalliance_agents.model.monitor import Record
+from lalliance_agents.model.events import Activate, Announce, BodyFailed, Command, Deactivate, TrialStarted
 from lalliance_agents.wire.keys import Key, Keys, Kind
 from lalliance_agents.wire.messages import Activity, BodyState, Heartbeat, Hello, Message, TaskState
 
@@ -81,20 +80,19 @@ class Robot:
         self.name = name
         self._mission = mission
         self._world = world
-        self._bus = bus
         self._clock = clock or MissionClock()
         self._catalog = catalog
         if incarnation is None:
             incarnation = catalog.incarnation if catalog else fresh_incarnation()
-        tasks = [task for task in mission.tasks if task in mission.robots[name].tasks]
+        tasks = tasks_of(mission, name)
         self._repertoire = complete_repertoire(name, tasks, behaviors)
-        self._random = random.Random(f"{mission.seed}/{name}/{incarnation}")
+        self._chance = chance_of(mission, name, incarnation)
         now = self._clock.now()
-        self.mind = Mind(name, tasks, mission.parameters_of(name), now=now, draw=self._random.random)
-        self._restore()
+        self.mind = new_mind(mission, name, self._chance, now=now, learned=catalog.learned if catalog else None)
         self._keys = Keys(mission.name)
-        self._messenger = Messenger(bus, self._keys, name, incarnation, self._clock.now)
-        self._reports = Reports(self._messenger)
+        self._bus = FaultyBus(bus, self._keys, name, self._clock)
+        self._messenger = Messenger(self._bus, self._keys, name, incarnation, self._clock.now)
+        self._reports = Reports(self._messenger, self._bus)
         self._team = Team(name, frozenset(tasks), MOST_TEAMMATES)
         for teammate in mission.teammates(name):
             self._team.meet(teammate, frozenset(mission.robots[teammate].tasks))
@@ -105,7 +103,7 @@ class Robot:
         self._broken: set[str] = set()
         self._contradicted: set[str] = set()
         self._store_failed = False
-        self._saved_version = self._version()
+        self._saved_version = self.mind.knowledge.version
         self._saving: asyncio.Task[None] | None = None
         self._refresh_due = self._greeting_due = self._motivation_due = now
         self._over: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
@@ -136,6 +134,8 @@ class Robot:
 
     async def _join(self) -> None:
         keys, listen = self._keys, self._messenger.listen
+        if self._world:  # before the first message comes to which a rule applies
+            await self._bus.obey(timeout=GREETING_TIMEOUT)
         for task in self._repertoire:
             await listen(keys.build(Kind.ACTIVITY, task=task), self._receive_presence)
         for teammate in self._team.abilities:
@@ -145,8 +145,7 @@ class Robot:
         self._motivations = await self._bus.publication(
             keys.build(Kind.MOTIVATION, robot=self.name), Delivery.TELEMETRY
         )
-        expected = frozenset(k for k in self._mission.teammates(self.name) if self._mission.robots[k].joins == 0.0)
-        self.mind.handle(RosterKnown(expected), self._clock.now())
+        self.mind.handle(roster(self._mission, self.name), self._clock.now())
         questions: dict[str, Receiver] = {keys.build(Kind.HELLO): self._receive_hello}
         if self._world:
             body = keys.build(Kind.SENSE_ROBOT, robot=self.name)
@@ -172,6 +171,7 @@ class Robot:
         # The last report goes out first: who waits for it need not wait for a body that cleans up slowly.
         self._reports.send(self.mind, self._clock.now(), final=True)
         await self._messenger.close()
+        await self._bus.forget()
         if ending:
             await asyncio.wait(ending)
         await self._performer.close()
@@ -265,7 +265,7 @@ class Robot:
 
     async def _tick_forever(self) -> None:
         period = self._mission.control_period
-        due = self._clock.now() + self._random.random() * period
+        due = self._clock.now() + self._chance.random() * period
         while True:
             await self._clock.sleep_until(due)
             now = self._clock.now()
@@ -311,7 +311,7 @@ class Robot:
         if now >= self._greeting_due:
             self._greeting_due = now + GREETING_PERIOD
             self._greet()
-        if self._catalog is not None and self._version() != self._saved_version and self._saving is None:
+        if self._catalog is not None and self.mind.knowledge.version != self._saved_version and self._saving is None:
             self._saving = asyncio.create_task(self._save())
             self._saving.add_done_callback(lambda _: setattr(self, "_saving", None))
 
@@ -322,24 +322,10 @@ class Robot:
         key = self._keys.build(Kind.HELLO, robot=self.name)
         return [Sample(key, self._messenger.compose(Kind.HELLO, tasks=list(self._repertoire)))]
 
-    def _restore(self) -> None:
-        learned: dict[str, dict[str, Record]] = {}
-        if self._mission.knowledge == "given":
-            for task in self._repertoire:
-                able = self._mission.able(task)
-                learned[task] = {robot: Record((self._mission.robots[robot].tasks[task],)) for robot in able}
-        if self._catalog is not None:
-            for task, records in self._catalog.learned.items():
-                learned.setdefault(task, {}).update(records)
-        self.mind.knowledge.restore(learned)
-
-    def _version(self) -> int:
-        return sum(monitor.version for monitor in self.mind.knowledge.monitors.values())
-
     async def _save(self) -> None:
-        if self._catalog is None or self._version() == self._saved_version:
+        if self._catalog is None or self.mind.knowledge.version == self._saved_version:
             return
-        version, learned = self._version(), self.mind.knowledge.records()
+        version, learned = self.mind.knowledge.version, self.mind.knowledge.records()
         try:
             await asyncio.to_thread(self._catalog.save, learned)
             self._saved_version = version

@@ -18,6 +18,9 @@ from enum import StrEnum
 from types import TracebackType
 from typing import Protocol, Self
 
+#: After this silence, in real seconds, a participant that hangs or is cut off counts as gone.
+LEASE = 2.0
+
 
 @dataclass(frozen=True, slots=True)
 class Sample:

@@ -3,8 +3,13 @@
 What leaves is numbered and stamped. What comes is dropped if it does not decode, if somebody speaks for another, or if it is
 no news; every drop is counted by its reason and logged once per key's owner and reason, as far as the limit of such lines. No
 message can raise an error here: a receiver that fails has lost the one message, and the first such failure is logged.
+
+Presence (activity and heartbeats) has numbers of its own, 1, 2, 3, …, and all other kinds share another row. What a link rule
+does to a message follows from its number, so a simulated robot that announces the same must count the same, whatever else the
+real one sends. Each key's stream takes its numbers from one row only, in the order of sending: what is news can be told.
 """
 
+import itertools
 import logging
 from collections import Counter
 from collections.abc import Callable
@@ -13,7 +18,7 @@ from typing import Any
 from lalliance_agents.bus.base import Bus, Delivery, Registration, Sample
 from lalliance_agents.errors import MessageError
 from lalliance_agents.wire.freshness import Freshness
-from lalliance_agents.wire.keys import Key, Keys, Kind
+from lalliance_agents.wire.keys import PRESENCE, Key, Keys, Kind
 from lalliance_agents.wire.messages import BODY_OF, Message, decode_at, encode
 
 _log = logging.getLogger(__name__)
@@ -54,19 +59,20 @@ class Messenger:
         self.received = 0
         self.dropped: Counter[str] = Counter()
         self._clock = clock
-        self._seq = 0
+        self._presence_numbers = itertools.count(1)
+        self._other_numbers = itertools.count(1)
         self._freshness = Freshness()
         self._logged: set[tuple[str, str]] = set()
         self._registrations: list[Registration] = []
 
     def compose(self, kind: Kind, /, **fields: Any) -> bytes:
-        """The packed message of `kind` with the next number."""
-        return encode(BODY_OF[kind](**self.header(), **fields))
+        """The packed message of `kind` with the next number of its row."""
+        return encode(BODY_OF[kind](**self.header(presence=kind in PRESENCE), **fields))
 
-    def header(self) -> dict[str, Any]:
-        """The header of the next message."""
-        self._seq += 1
-        return {"sender": self.me, "incarnation": self.incarnation, "seq": self._seq, "at": self._clock()}
+    def header(self, *, presence: bool = False) -> dict[str, Any]:
+        """The header of the next message of the row of presence, or of all others."""
+        seq = next(self._presence_numbers if presence else self._other_numbers)
+        return {"sender": self.me, "incarnation": self.incarnation, "seq": seq, "at": self._clock()}
 
     def send(self, kind: Kind, /, *, key_task: str = "", key_robot: str = "", **fields: Any) -> None:
         """Publish a message of `kind` under this participant's own name.

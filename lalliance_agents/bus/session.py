@@ -19,10 +19,9 @@ from typing import Any, TypeVar
 
 import zenoh
 
+from lalliance_agents.bus.base import LEASE
 from lalliance_agents.errors import BusError
 
-#: After this silence, in seconds, a peer that hangs or is cut off counts as gone.
-LEASE = 2.0
 #: Larger messages are refused by the transport, in bytes.
 MAX_MESSAGE = 1024 * 1024
 #: A close that takes longer, in seconds, is left to itself.

@@ -7,18 +7,17 @@ decided by the reading of its `Erratum`.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from lalliance_agents.model import equations
 from lalliance_agents.model.events import Factors, Pace, Teammate
 from lalliance_agents.model.hearing import Contact, Hearing
 from lalliance_agents.model.knowledge import Knowledge
-from lalliance_agents.model.motivation import Motivation
-from lalliance_agents.model.parameters import Architecture, Erratum, Parameters
+from lalliance_agents.model.motivation import Expectation, Motivation
+from lalliance_agents.model.parameters import SLACK, Architecture, Erratum, Parameters
 
 
-@dataclass(frozen=True, slots=True)
-class Moment:
+class Moment(NamedTuple):
     """What all sets of a robot have in common at one step."""
 
     now: float
@@ -41,6 +40,8 @@ class Appraisal:
 
     def __init__(self, parameters: Parameters, knowledge: Knowledge, hearing: Hearing) -> None:
         self._parameters = parameters
+        self._threshold = parameters.threshold
+        self._collision_window = parameters.effective_collision_window
         self._knowledge = knowledge
         self._hearing = hearing
         self._learns = parameters.architecture is Architecture.L_ALLIANCE
@@ -53,33 +54,49 @@ class Appraisal:
 
     def adaptive(self, one: Motivation, moment: Moment, *, suppressed: bool) -> Factors:
         """The factors of `one` in the adaptive phase; its motivation is left at 0 for the caller to fill in."""
-        now, own_time = moment.now, self._knowledge.own_time(one.task)
-        best_time = self._knowledge.best_time(one.task, moment.present)
-        contended = self._hearing.anybody_on(one.task, now)
+        on_task = self._hearing.on_task(one.task, moment.now)
+        expected = self._expect(one, moment.present, contended=bool(on_task))
+        pace, rate = self._impatience(one, moment, expected, on_task)
+        return Factors(
+            0.0,
+            pace,
+            rate,
+            self._threshold / expected.fast,
+            expected.category,
+            expected.own_time,
+            expected.best_time,
+            moment.boredom,
+            one.sensory_feedback,
+            0 if suppressed else 1,
+            self._reset(one, moment),
+            equations.acquiescence(one.active_for(moment.now), expected.psi, expected.contended, expected.lambda_),
+            self._influence(one, moment, expected.category),
+            expected.psi,
+            expected.lambda_,
+        )
+
+    def _expect(self, one: Motivation, present: Sequence[str], *, contended: bool) -> Expectation:
+        """What is expected of a task; computed anew only when something it depends on has changed."""
+        known, task = one.expectation, one.task
+        if (
+            known is not None
+            and known.learned == self._knowledge.version
+            and known.present is present
+            and known.contended is contended
+        ):
+            return known
+        own_time = self._knowledge.own_time(task)
+        best_time = self._knowledge.best_time(task, present)
         # A robot does not expect to be best by a time that is only a lower bound: or it returns to its failure before
         # it is bored enough to try what a stuck teammate holds, and the two never come free.
-        expects = self._knowledge.knows_teammates and not self._knowledge.has_failed(one.task)
+        expects = self._knowledge.knows_teammates and not self._knowledge.has_failed(task)
         category = equations.task_category(own_time, best_time, contended, expects, self._parameters.ordering)
         fast = self._fast_rate(one, category, own_time)
-        pace, rate = self._impatience(one, moment, own_time, fast)
-        psi, lambda_ = self._patience_with_oneself(one.task, own_time, best_time)
-        return Factors(
-            motivation=0.0,
-            pace=pace,
-            rate=rate,
-            delay=self._parameters.threshold / fast,
-            category=category,
-            own_time=own_time,
-            best_time=best_time,
-            boredom=moment.boredom,
-            sensory_feedback=one.sensory_feedback,
-            activity_suppression=0 if suppressed else 1,
-            impatience_reset=self._reset(one, moment),
-            acquiescence=equations.acquiescence(one.active_for(now), psi, contended, lambda_),
-            learned_robot_influence=self._influence(one, moment, category),
-            psi=psi,
-            lambda_=lambda_,
+        psi, lambda_ = self._patience_with_oneself(task, own_time, best_time)
+        one.expectation = Expectation(
+            self._knowledge.version, present, contended, own_time, best_time, category, fast, psi, lambda_
         )
+        return one.expectation
 
     def learning(self, one: Motivation, moment: Moment, *, suppressed: bool) -> Factors:
         """The factors of `one` in the active learning phase: no impatience, no acquiescence, no giving up."""
@@ -119,15 +136,19 @@ class Appraisal:
         ]
         return tuple(sorted(found, key=lambda one: (-one.last_heard, one.robot)))
 
+    def contender(self, task: str) -> str | None:
+        """The teammate on `task` that was heard last; None if there is none."""
+        on_task = [contact for contact in self._hearing.contacts(task) if contact.lapsed_at is None]
+        return min(on_task, key=lambda one: (-one.last, one.robot)).robot if on_task else None
+
     def rival(self, one: Motivation, me: str, now: float) -> str | None:
         """A teammate that started the same task at the same time and expects to be faster (erratum 15)."""
         if one.active_since is None:
             return None
-        window = self._parameters.effective_collision_window
         for contact in self._hearing.contacts(one.task):
             if (
                 self._hearing.is_on(contact, now)
-                and equations.collides(one.active_since, contact.started, window)
+                and equations.collides(one.active_since, contact.started, self._collision_window)
                 and (contact.expected, contact.robot) < (one.expected, me)
             ):
                 return contact.robot
@@ -162,26 +183,44 @@ class Appraisal:
         )
         return equations.fast_rate(parameters.threshold, wait)
 
-    def _impatience(self, one: Motivation, moment: Moment, own_time: float, fast: float) -> tuple[Pace, float]:
+    def _impatience(
+        self, one: Motivation, moment: Moment, expected: Expectation, on_task: Sequence[Contact]
+    ) -> tuple[Pace, float]:
         """impatience_ij(t): the least delta_slow of those who hold this robot back, else delta_fast."""
-        slow, everybody = [], []
-        for contact in self._hearing.contacts(one.task):
-            phi = self._patience(contact, one.task, own_time)
-            rate = self._slow_rate(one.task, phi)
-            everybody.append(rate)
-            on_task = self._hearing.is_on(contact, moment.now)
-            if equations.holds_back(on_task, self._hearing.heard_until(contact, moment.now - phi)):
-                slow.append(rate)
-        if slow and self._slowest_of_all:
-            slow = everybody
-        pace, rate = (Pace.SLOW, min(slow)) if slow else (Pace.FAST, fast)
+        pace, rate, slow = Pace.FAST, expected.fast, []
+        for contact in on_task:
+            phi, slow_rate = self._held(one.task, contact, expected)
+            if equations.holds_back(True, self._hearing.heard_until(contact, moment.now - phi)):
+                slow.append(slow_rate)
+        if slow:
+            if self._slowest_of_all:
+                slow = [self._held(one.task, contact, expected)[1] for contact in self._hearing.contacts(one.task)]
+            pace, rate = Pace.SLOW, min(slow)
         if math.isnan(rate):
             return Pace.UNDEFINED, 0.0
         return self._pace(one, moment, pace), rate
 
+    def _held(self, task: str, contact: Contact, expected: Expectation) -> tuple[float, float]:
+        """phi_ij(k, t) in seconds, and delta_slow_ij(k, t)."""
+        held = expected.held.get(contact.robot)
+        if held is None:
+            phi = self._patience(contact, task, expected.own_time)
+            held = expected.held[contact.robot] = phi, self._slow_rate(task, phi)
+        return held
+
+    def patience_ends(self, task: str, now: float) -> float:
+        """The earliest instant after `now` at which patience with somebody on `task` runs out; infinity if there is none."""
+        earliest, own_time = math.inf, self._knowledge.own_time(task)
+        for contact in self._hearing.contacts(task):
+            phi = self._patience(contact, task, own_time)
+            if self._hearing.is_on(contact, now) and not self._hearing.heard_until(contact, now - phi):
+                ends = self._hearing.beginning(contact) + phi
+                earliest = ends if ends < earliest else earliest  # no time, erratum 10 read literally, is no less
+        return earliest - SLACK
+
     @staticmethod
     def _pace(one: Motivation, moment: Moment, pace: Pace) -> Pace:
-        if one.active:
+        if one.active_since is not None:
             return Pace.WORKING
         return Pace.WAITING if moment.waiting else pace
 
@@ -206,16 +245,11 @@ class Appraisal:
         return equations.yield_time(parameters.strategy, own_time, best_time), give_up
 
     def _reset(self, one: Motivation, moment: Moment) -> int:
-        if one.active and not self._reset_on_active:
+        if one.active_since is not None and not self._reset_on_active:
             return 1
-        return equations.impatience_reset(
-            any(
-                self._hearing.is_news(contact, moment.before, moment.now)
-                for contact in self._hearing.contacts(one.task)
-            )
-        )
+        return equations.impatience_reset(self._hearing.any_news(one.task, moment.before, moment.now))
 
     def _influence(self, one: Motivation, moment: Moment, category: int) -> int:
-        if not self._learns or (one.active and not self._influence_on_active):
+        if not self._learns or (one.active_since is not None and not self._influence_on_active):
             return 1
         return equations.learned_robot_influence(moment.boredom, self._parameters.boredom_threshold, category)

@@ -25,6 +25,18 @@ def reaches(value: float, limit: float) -> bool:
     return value >= limit - SLACK
 
 
+def ramp_reaches(base: float, since: float, rate: float, limit: float) -> float:
+    """The instant from which a ramp `reaches` the limit, in seconds; infinity if it never does.
+
+    Args:
+        base: its value at `since`.
+        since: an instant, in seconds.
+        rate: its growth, per second.
+        limit: what is to be reached.
+    """
+    return since + (limit - SLACK - base) / rate if rate > 0.0 else math.inf
+
+
 def in_window(instant: float, after: float, until: float, closed: bool = True) -> bool:
     """comm_received's time span: (after, until] when `closed`, or open at both ends (erratum 7, literal)."""
     if closed:

@@ -120,6 +120,21 @@ class Factors(NamedTuple):
     psi: float
     lambda_: float
 
+    @property
+    def is_open(self) -> bool:
+        """Whether no factor of the product is 0."""
+        return (
+            self.sensory_feedback == 1
+            and self.activity_suppression == 1
+            and self.impatience_reset == 1
+            and self.acquiescence == 1
+            and self.learned_robot_influence == 1
+        )
+
+    def having(self, motivation: float) -> "Factors":
+        """The same factors with the motivation that they produced."""
+        return Factors._make((motivation, *self[1:]))
+
 
 class Teammate(NamedTuple):
     """What was known, at a decision, of one teammate that had been heard on the task."""

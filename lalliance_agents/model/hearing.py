@@ -6,10 +6,11 @@ messages. Robots are kept in the order in which they were first heard, so that n
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from lalliance_agents.model.equations import in_window
+from lalliance_agents.model.parameters import EARLY
 
 
 @dataclass(slots=True)
@@ -33,6 +34,22 @@ class Contact:
     """Whether a step has counted the first message."""
 
 
+_NOBODY: dict[str, Contact] = {}
+
+
+@dataclass(slots=True)
+class Presence:
+    """Where one teammate was last heard, and when."""
+
+    last: float
+    task: str | None = None
+    """The task that its latest message was about, if this robot can do it."""
+    contact: Contact | None = None
+    """The contact that its latest message belongs to; None if it was idle, or said nothing sensible."""
+    absent: bool = False
+    """Whether a step has found it silent for tau since it was last heard."""
+
+
 class Hearing:
     """Everything one robot has heard in this trial.
 
@@ -46,54 +63,78 @@ class Hearing:
         self._tau = silence_timeout
         self._closed = closed
         self._per_attempt = per_attempt
-        self._last: dict[str, float] = {}
+        #: Where each robot heard in this trial was last heard, in the order of their first messages.
+        self.presences: dict[str, Presence] = {}
+        self._present: list[str] | None = None
         self._contacts: dict[str, dict[str, Contact]] = {}
+        #: Those of the contacts that have not lapsed, and those that no step has counted yet.
+        self._lasting: list[Contact] = []
+        self._news: list[Contact] = []
 
     def forget(self) -> None:
         """Begin a trial in which nobody has been heard."""
-        self._last.clear()
+        self.presences.clear()
+        self._present = None
         self._contacts.clear()
+        self._lasting.clear()
+        self._news.clear()
 
-    def heard(self, robot: str, now: float) -> None:
-        """`robot` is there."""
-        self._last[robot] = now
+    def heard(self, robot: str, now: float, task: str | None = None) -> None:
+        """`robot` is there, and its message was about `task`."""
+        presence = self.presences.get(robot)
+        if presence is None or presence.absent:
+            self._present = None
+        if presence is None:
+            presence = self.presences[robot] = Presence(now)
+        presence.last, presence.task, presence.contact, presence.absent = now, task, None, False
 
     def heard_on(self, robot: str, task: str, now: float, *, active_for: float, expected: float, fresh: bool) -> None:
         """`robot` is on `task`; `fresh` if this is not the attempt it was last heard with."""
-        self.heard(robot, now)
+        self.heard(robot, now, task)
         contacts = self._contacts.setdefault(task, {})
         contact = contacts.get(robot)
         if contact is None:
-            contacts[robot] = Contact(robot, now, now, now, now - active_for, expected)
-            return
-        if fresh:
+            contact = contacts[robot] = Contact(robot, now, now, now, now - active_for, expected)
+            self._lasting.append(contact)
+            self._news.append(contact)
+        elif fresh:
             contact.since = now
             contact.started = now - active_for
-            contact.noticed = contact.noticed and not self._per_attempt
+            if self._per_attempt and contact.noticed:
+                contact.noticed = False
+                self._news.append(contact)
+        if contact.lapsed_at is not None:
+            contact.lapsed_at = None
+            self._lasting.append(contact)
         contact.last = now
         contact.expected = expected
-        contact.lapsed_at = None
+        self.presences[robot].contact = contact
 
     def has_heard(self, robots: frozenset[str]) -> bool:
         """Whether each of `robots` was heard in this trial."""
-        return robots <= self._last.keys()
+        return robots <= self.presences.keys()
 
     def is_present(self, robot: str, now: float) -> bool:
         """Whether `robot` was heard within tau, about anything."""
-        last = self._last.get(robot, -math.inf)
-        return in_window(last, now - self._tau, now, self._closed)
+        presence = self.presences.get(robot)
+        return presence is not None and in_window(presence.last, now - self._tau, now, self._closed)
 
     def robots_present(self, now: float) -> list[str]:
         """The teammates heard within tau; the robot itself is not among them (erratum 3 adds it)."""
-        return [robot for robot in self._last if self.is_present(robot, now)]
+        return [robot for robot in self.presences if self.is_present(robot, now)]
 
     def silences(self, now: float) -> dict[str, float]:
         """How long ago each teammate was last heard, in seconds."""
-        return {robot: max(now - last, 0.0) for robot, last in self._last.items()}
+        return {robot: max(now - presence.last, 0.0) for robot, presence in self.presences.items()}
 
-    def contacts(self, task: str) -> Iterator[Contact]:
+    def contacts(self, task: str) -> Collection[Contact]:
         """All teammates heard on `task` in this trial."""
-        return iter(self._contacts.get(task, {}).values())
+        return self._contacts.get(task, _NOBODY).values()
+
+    def on_task(self, task: str, now: float) -> list[Contact]:
+        """The teammates heard on `task` within tau."""
+        contacts = self.contacts(task)
+        return [contact for contact in contacts if self.is_on(contact, now)] if contacts else []
 
     def is_on(self, contact: Contact, now: float) -> bool:
         """comm_received(i, k, j, t - tau, t)."""
@@ -101,11 +142,11 @@ class Hearing:
 
     def anybody_on(self, task: str, now: float) -> bool:
         """Whether any teammate was heard on `task` within tau."""
-        return any(self.is_on(contact, now) for contact in self.contacts(task))
+        return bool(self.on_task(task, now))
 
     def heard_until(self, contact: Contact, instant: float) -> bool:
         """comm_received(i, k, j, 0, instant)."""
-        return in_window(self._beginning(contact), -math.inf, instant, self._closed)
+        return in_window(self.beginning(contact), -math.inf, instant, self._closed)
 
     def is_news(self, contact: Contact, before: float, now: float) -> bool:
         """comm_received in (before, now], and not in (0, before]: first heard since the last communication check.
@@ -115,20 +156,52 @@ class Hearing:
         """
         if self._closed:
             return not contact.noticed
-        return in_window(self._beginning(contact), before, now, closed=False)
+        return in_window(self.beginning(contact), before, now, closed=False)
 
-    def note_checked(self) -> None:
-        """All that was heard so far has been counted: it is no news to the next step."""
-        for contacts in self._contacts.values():
-            for contact in contacts.values():
-                contact.noticed = True
+    def any_news(self, task: str, before: float, now: float) -> bool:
+        """Whether any teammate was first heard on `task` since the last communication check."""
+        if self._closed and not self._news:
+            return False
+        return any(self.is_news(contact, before, now) for contact in self.contacts(task))
 
-    def _beginning(self, contact: Contact) -> float:
+    def note_checked(self) -> bool:
+        """All that was heard so far has been counted: it is no news to the next step. Whether there was any news."""
+        if not self._news:
+            return False
+        for contact in self._news:
+            contact.noticed = True
+        self._news.clear()
+        return True
+
+    def beginning(self, contact: Contact) -> float:
+        """The instant with which first-heard windows begin (erratum 16)."""
         return contact.since if self._per_attempt else contact.first
 
     def note_lapses(self, now: float) -> None:
-        """Remember the instant at which each teammate ceases to be heard on a task."""
-        for contacts in self._contacts.values():
-            for contact in contacts.values():
-                if contact.lapsed_at is None and not self.is_on(contact, now):
-                    contact.lapsed_at = now
+        """Remember who has ceased to be heard, and the instant at which each teammate ceases to be heard on a task."""
+        if self._closed and now < self.next_lapse():
+            return
+        self._present = None
+        for robot, presence in self.presences.items():
+            presence.absent = not self.is_present(robot, now)
+        for contact in self._lasting:
+            if not self.is_on(contact, now):
+                contact.lapsed_at = now
+        self._lasting = [contact for contact in self._lasting if contact.lapsed_at is None]
+
+    def next_lapse(self) -> float:
+        """The earliest instant at which a step may find that somebody has ceased to be heard, there or on a task."""
+        last = math.inf
+        for presence in self.presences.values():
+            if presence.last < last and not presence.absent:
+                last = presence.last
+        for contact in self._lasting:
+            if contact.last < last:  # noqa: PLR1730 - this is asked for at every step, and `min` costs thrice as much
+                last = contact.last
+        return last + self._tau - EARLY
+
+    def present(self, now: float) -> list[str]:
+        """`robots_present` after `note_lapses` of the same instant: the same list, until somebody comes or goes."""
+        if self._present is None or not self._closed:
+            self._present = self.robots_present(now)
+        return self._present

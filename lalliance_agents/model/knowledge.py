@@ -29,23 +29,30 @@ class Knowledge:
         self._undefined_if_unknown = parameters.is_literal(Erratum.UNKNOWN_TIMES)
         self._self_counts = not parameters.is_literal(Erratum.SELF_PRESENCE)
         self.monitors = {task: Monitor(me, parameters) for task in tasks}
+        #: Grows with each change of what is known.
+        self.version = 0
         self._seen = -1
         self._low = self._high = math.nan
         self._fallback = parameters.initial_task_time
         self._knows_teammates = False
+        for monitor in self.monitors.values():
+            monitor.on_change = self._changed
+
+    def _changed(self) -> None:
+        self.version += 1
 
     def _read(self) -> None:
-        seen = sum(monitor.version for monitor in self.monitors.values())
-        if seen == self._seen:
+        if self.version == self._seen:
             return
-        self._seen = seen
-        known = [(robot, time) for monitor in self.monitors.values() for robot, time in monitor.times()]
-        measured = [time for monitor in self.monitors.values() for time in monitor.measured()]
-        self._fallback = max(measured, default=self._parameters.initial_task_time)
-        times = [time for _, time in known] + [self.own_time(task) for task in self.monitors]
-        self._low = min((time for time in times if not math.isnan(time)), default=math.nan)
-        self._high = max((time for time in times if not math.isnan(time)), default=math.nan)
-        self._knows_teammates = any(robot != self._me for robot, _ in known)
+        self._seen = self.version
+        extents = [monitor.extent() for monitor in self.monitors.values()]
+        longest = max((extent.longest for extent in extents), default=0.0)
+        self._fallback = longest if longest > 0.0 else self._parameters.initial_task_time
+        own = [time for time in map(self.own_time, self.monitors) if not math.isnan(time)]
+        low = min([extent.low for extent in extents] + own, default=math.inf)
+        high = max([extent.high for extent in extents] + own, default=-math.inf)
+        self._low, self._high = (low, high) if low <= high else (math.nan, math.nan)
+        self._knows_teammates = any(extent.of_teammates for extent in extents)
 
     def own_time(self, task: str) -> float:
         """task_time_i(i, j, t) in seconds, or what stands for it; NaN if erratum 10 is read literally."""

@@ -4,6 +4,11 @@ A driver hands in what the robot perceives (`handle`) and calls `tick` once per 
 of every behaviour set, lets motivations grow or fall, stops the active set or starts one, and says what to broadcast. All
 that is decided carries the factors behind it. Sets are suppressed by the set that was active when the tick began, so a robot
 that stops one task begins to want another from the next tick on.
+
+Most ticks change nothing but ramps. A driver that wants to save them asks after a tick when the next one is needed: at the
+first instant of its grid that is not before `wake`, unless an event comes first, and at the first not before `next_lapse`.
+In between it says with `rest` which instants it left out, and lets the mind `beat` where an announcement is due. All that
+the mind decides and says is then the same, to the last bit.
 """
 
 import math
@@ -25,14 +30,15 @@ from lalliance_agents.model.events import (
     Pace,
     RosterKnown,
     Sensed,
-    Teammate,
     TrialStarted,
     Verb,
 )
 from lalliance_agents.model.hearing import Hearing
 from lalliance_agents.model.knowledge import Knowledge
+from lalliance_agents.model.listening import Listener
 from lalliance_agents.model.motivation import Motivation
-from lalliance_agents.model.parameters import SLACK, Architecture, Erratum, Learning, Parameters
+from lalliance_agents.model.outlook import AT_ONCE, Outlook
+from lalliance_agents.model.parameters import EARLY, SLACK, Architecture, Erratum, Learning, Parameters
 
 #: Ends of an attempt after which the robot is not held to have failed.
 _BLAMELESS = {Cause.COLLISION, Cause.INAPPLICABLE, Cause.NEW_TRIAL, Cause.NOT_BEST, Cause.SUPPRESSED}
@@ -70,14 +76,23 @@ class Mind:
         self._appraisal = Appraisal(parameters, self.knowledge, self.hearing)
         self._draw = draw
         self._sets = {task: Motivation(task, 0.0) for task in tasks}
+        self._listener = Listener(me, self._sets, self.hearing, self.knowledge)
+        self._learns = parameters.architecture is Architecture.L_ALLIANCE
+        self._boredom_rate = parameters.effective_boredom_rate
+        self._broadcast_period = parameters.broadcast_period
         self._roster: frozenset[str] | None = None
         self._before = now
         self._broadcast_due = now
         self._pending: list[Command] = []
         self._many = parameters.is_literal(Erratum.ONE_ACTIVE)
+        # Where motivation 0 is below the threshold, a set that is suppressed is 0 whatever else speaks for or against it.
+        self._suppresses = not (self._many or equations.reaches(0.0, parameters.threshold))
+        self._moment: Moment | None = None
         self._beats = not parameters.is_literal(Erratum.IDLE_HEARTBEAT)
         self._collisions = not parameters.is_literal(Erratum.COLLISION)
         self._bored_at_work = parameters.is_literal(Erratum.BOREDOM_AT_WORK) and len(self._sets) == 1
+        self._outlook = Outlook(parameters, self._appraisal, self.hearing, len(self._sets))
+        self._wake: float | None = AT_ONCE
         self._begin_trial(Learning.ADAPTIVE, now)
 
     def __repr__(self) -> str:
@@ -98,17 +113,26 @@ class Mind:
     @property
     def active(self) -> list[str]:
         """The tasks whose sets are active: at most one, unless erratum 5 is read literally."""
-        return [task for task, one in self._sets.items() if one.active]
+        return [task for task, one in self._sets.items() if one.active_since is not None]
 
     def factors(self) -> dict[str, Factors]:
-        """What produced each motivation at the last tick."""
-        return {task: one.factors for task, one in self._sets.items() if one.factors is not None}
+        """What produced each motivation at the last tick; of sets that another one suppressed, looked up only now."""
+        if self._moment is None:
+            return {}
+        return {
+            task: one.factors or self._appraise(one, self._moment, suppressed=True) for task, one in self._sets.items()
+        }
 
     def handle(self, event: Event, now: float) -> None:
-        """Take in what was perceived at `now`; what follows from it is decided at the next tick."""
+        """Take in what was perceived at `now`; what follows from it is decided at the next tick.
+
+        Anything but a refresh (`is_refresh`) makes that the very next step of the driver's grid.
+        """
         match event:
             case Heard():
-                self._hear(event, now)
+                if self._listener.hear(event, now):
+                    self._wake = AT_ONCE
+                return
             case Sensed() if event.task in self._sets:
                 self._sense(event, self._sets[event.task], now)
             case BodyFailed() if event.task in self._sets:
@@ -118,25 +142,21 @@ class Mind:
             case RosterKnown():
                 self._roster = event.robots - {self.me}
             case _:
-                pass  # about a task this robot cannot do
+                return  # about a task this robot cannot do
+        self._wake = AT_ONCE
 
-    def _hear(self, event: Heard, now: float) -> None:
-        if event.robot == self.me:
-            return
-        self.hearing.heard(event.robot, now)
-        for task, monitor in self.knowledge.monitors.items():
-            if task != event.task:
-                monitor.elsewhere(event.robot, now)
-        if event.task is None or event.task not in self._sets:
-            return
-        if not 0.0 <= event.active_for < math.inf:
-            return  # no attempt can be so long; the teammate is there, and nothing more is known
-        workable = self._sets[event.task].sensory_feedback == 1
-        monitor = self.knowledge.monitors[event.task]
-        fresh = workable and monitor.observe(event.robot, now, event.active_for)
-        self.hearing.heard_on(
-            event.robot, event.task, now, active_for=event.active_for, expected=event.expected, fresh=fresh
-        )
+    def is_refresh(self, event: Heard, now: float) -> bool:
+        """Whether what is heard at `now` only goes on with what was heard before, so that `wake` stays as it is.
+
+        It does if the teammate is not held to be silent, its last message was about the same task (or, like this one, none
+        that this robot can do), and, on a task, it expects the same time and the monitor takes it for the same attempt.
+
+        A run is a refresh and the messages after it of the same teammate, task, attempt and expected time, as long as none
+        says to be active for less long than the one before, and none was under way for longer than tau. To hand in the last
+        of a run alone, with the instant of its arrival, leaves the mind as if all had been handed in: provided it is done
+        before any tick, before any other event (which ends the run), and before `next_lapse` is believed.
+        """
+        return self._listener.is_refresh(event, now)
 
     def _sense(self, event: Sensed, one: Motivation, now: float) -> None:
         monitor = self.knowledge.monitors[event.task]
@@ -154,27 +174,68 @@ class Mind:
             monitor.settle(now)
         commands, self._pending = self._pending, []
         working = self.active
-        moment = self._moment(now, before, working)
+        moment = self._moment = self._moment_at(now, before, working)
+        busy = bool(working) and self._suppresses
         for one in self._sets.values():
-            suppressed = any(task != one.task for task in working)
+            if busy and one.active_since is None:
+                one.suppress(now)
+                continue
+            suppressed = bool(working) and working != [one.task]
             factors = self._appraise(one, moment, suppressed=suppressed)
-            if one.active:
-                one.factors = factors._replace(motivation=one.value(now))
+            if one.active_since is not None:
+                one.factors = factors.having(one.value(now))
                 commands += self._continue(one, now)
             else:
                 self._grow(one, factors, moment)
         activations = self._activate(now)
-        self.hearing.note_checked()
+        any_news = self.hearing.note_checked()
+        at_rest = not (commands or activations or any_news or self._outlook.restless)
+        self._wake = None if at_rest else AT_ONCE
         return commands + activations + self._announce(now, before, urgent=bool(activations))
 
-    def _moment(self, now: float, before: float, working: list[str]) -> Moment:
+    def wake(self) -> float:
+        """The instant before which no tick would decide or change anything, but for silences; in seconds.
+
+        A tick before it would let ramps grow and announce what is due, no more; it may be early, and a tick then does no
+        harm. Minus infinity asks for the next step of the grid, infinity for none. It holds after a tick until an event is
+        handled that is no refresh (`is_refresh`), which makes it minus infinity. Learned times are not to be restored
+        in between.
+        """
+        if self._wake is None:
+            self._wake = self._foresee(self._before) - EARLY
+        return self._wake
+
+    def _foresee(self, now: float) -> float:
+        changes = [monitor.settles_at() for monitor in self.knowledge.monitors.values()]
+        if self._waiting:
+            changes.append(self._born + self.parameters.silence_timeout)
+        elif not self.active:
+            rate, threshold = self._boredom_rate, self.parameters.boredom_threshold
+            if not equations.reaches(equations.boredom(rate, now - self._idle_since), threshold):
+                changes.append(equations.ramp_reaches(0.0, self._idle_since, rate, threshold))
+        working = self.active if self._suppresses else []
+        changes += [self._outlook.next_change(self._sets[task], now) for task in working or self._sets]
+        return min(changes, default=math.inf)
+
+    def next_lapse(self) -> float:
+        """The earliest instant at which a tick may find somebody silent that was not; cheap, and moved by each message.
+
+        It may be early, never late, for what has been handed in; see `is_refresh` for what may be held back till now.
+        """
+        return self.hearing.next_lapse()
+
+    def rest(self, until: float) -> None:
+        """The steps up to and including `until`, at which nothing was to be done, were left out; none is undone."""
+        self._before = max(self._before, until)
+
+    def _moment_at(self, now: float, before: float, working: list[str]) -> Moment:
         if self._waiting and self._roster_heard(now):
             self._waiting = False
             self._idle_since = before
         idle = self._bored_at_work or not working
         idle_for = now - self._idle_since if idle and not self._waiting else 0.0
-        bored = equations.boredom(self.parameters.effective_boredom_rate, idle_for)
-        return Moment(now, before, self.hearing.robots_present(now), bored, self._waiting)
+        bored = equations.boredom(self._boredom_rate, idle_for)
+        return Moment(now, before, self.hearing.present(now), bored, self._waiting)
 
     def _roster_heard(self, now: float) -> bool:
         """Erratum 4: the roster was heard, or one tau has passed."""
@@ -183,27 +244,28 @@ class Mind:
         return equations.reaches(now - self._born, self.parameters.silence_timeout)
 
     def _appraise(self, one: Motivation, moment: Moment, *, suppressed: bool) -> Factors:
-        if self._learning is Learning.ACTIVE and self.parameters.architecture is Architecture.L_ALLIANCE:
+        if self._learns and self._learning is Learning.ACTIVE:
             return self._appraisal.learning(one, moment, suppressed=suppressed)
         return self._appraisal.adaptive(one, moment, suppressed=suppressed)
 
     def _grow(self, one: Motivation, factors: Factors, moment: Moment) -> None:
         """m_ij(t) of a set that is not active."""
-        gates = (
+        one.grow(0.0 if moment.waiting else factors.rate, moment.before)
+        increment = one.rate * (moment.now - one.since)
+        if factors.pace is Pace.RANDOM and factors.is_open:
+            increment = self.parameters.threshold * self._draw()
+        value = equations.motivation(
+            one.base,
+            increment,
             factors.sensory_feedback,
             factors.activity_suppression,
             factors.impatience_reset,
             factors.acquiescence,
             factors.learned_robot_influence,
         )
-        one.grow(0.0 if moment.waiting else factors.rate, moment.before)
-        increment = one.rate * (moment.now - one.since)
-        if factors.pace is Pace.RANDOM and all(gates):
-            increment = self.parameters.threshold * self._draw()
-        value = equations.motivation(one.base, increment, *gates)
         if value <= 0.0 or factors.pace is Pace.RANDOM:
             one.hold(value, moment.now)
-        one.factors = factors._replace(motivation=value)
+        one.factors = factors if value == 0.0 else factors.having(value)
 
     def _continue(self, one: Motivation, now: float) -> list[Command]:
         """Let the active set go on, or stop it."""
@@ -214,9 +276,11 @@ class Mind:
         factors = one.factors
         assert factors is not None  # noqa: S101 - set by `tick` just before
         rival = self._appraisal.rival(one, self.me, now) if self._collisions else None
-        contender = next((mate.robot for mate in self._contenders(one, now)), None)
+        contender = self._appraisal.contender(one.task)
         # Acquiescence with no limit to an attempt is 0 only because of the contender.
         yields = equations.acquiescence(one.active_for(now), factors.psi, contender is not None, math.inf) == 0
+        if factors.is_open and not (one.complete or one.body_failed or yields or rival is not None):
+            return None, None
         reasons: list[tuple[bool, Cause, str | None]] = [
             (one.complete, Cause.SENSED, None),
             (factors.sensory_feedback == 0, Cause.INAPPLICABLE, None),
@@ -230,15 +294,12 @@ class Mind:
         ]
         return next(((cause, other) for holds, cause, other in reasons if holds), (None, None))
 
-    def _contenders(self, one: Motivation, now: float) -> list[Teammate]:
-        return [mate for mate in self._appraisal.teammates(one.task, now) if mate.lapsed_at is None]
-
     def _stop(self, one: Motivation, now: float, cause: Cause, other: str | None) -> Decision:
         decision = self._decision(one, now, _VERBS.get(cause, Verb.DROP), cause, other)
         if cause is not Cause.SENSED:
             self.knowledge.monitors[one.task].ceased(now, failed=cause not in _BLAMELESS)
         one.deactivate(now)
-        one.factors = decision.factors._replace(motivation=0.0)
+        one.factors = decision.factors.having(0.0)
         if not self._bored_at_work:
             self._idle_since = now
         return decision
@@ -252,9 +313,13 @@ class Mind:
     def _activate(self, now: float) -> list[Command]:
         """Erratum 5: incumbent first, then the highest motivation, then the lowest task index."""
         theta = self.parameters.threshold
-        ready = [one for one in self._sets.values() if not one.active and equations.reaches(one.value(now), theta)]
+        if not self._many and self.active:
+            return []
+        ready = [
+            one for one in self._sets.values() if one.active_since is None and equations.reaches(one.value(now), theta)
+        ]
         if not self._many:
-            if not ready or self.active:
+            if not ready:
                 return []
             highest = max(one.value(now) for one in ready)
             ready = [next(one for one in ready if one.value(now) >= highest - SLACK)]
@@ -280,12 +345,26 @@ class Mind:
             return Cause.IMPATIENCE, latest.robot
         return (Cause.RELEASED if latest.present else Cause.SILENCE), latest.robot
 
+    @property
+    def broadcast_due(self) -> float:
+        """The instant at which the next announcement is due."""
+        return self._broadcast_due
+
+    def is_broadcast_due(self, now: float, before: float) -> bool:
+        """Whether the step at `now`, after one at `before`, is to announce: it is the first nearest to the instant due."""
+        half_a_step = (now - before) / 2
+        return now >= self._broadcast_due - half_a_step - SLACK
+
+    def beat(self, now: float) -> list[Command]:
+        """A step at `now` that does no more than a tick with nothing to decide: announce what is due."""
+        before, self._before = self._before, now
+        return self._announce(now, before, urgent=False)
+
     def _announce(self, now: float, before: float, *, urgent: bool) -> list[Command]:
         """Broadcast at rate rho, by the tick nearest to the instant due, and at once on activation."""
-        half_a_step = (now - before) / 2
-        if not urgent and now < self._broadcast_due - half_a_step - SLACK:
+        if not urgent and not self.is_broadcast_due(now, before):
             return []
-        period = self.parameters.broadcast_period
+        period = self._broadcast_period
         kept = self._broadcast_due + period
         self._broadcast_due = kept if not urgent and kept > now else now + period
         working = self.active

@@ -10,8 +10,9 @@ more than tau after it was last heard, a new attempt has begun. A teammate heard
 may still be working and is not judged before the task is complete or the teammate is heard again.
 """
 
+import math
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -31,28 +32,45 @@ class Record(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Attempt:
+class Attempt:
+    """One attempt that is watched. Instants are the watching robot's own."""
+
     started: float
     last: float
     active_for: float
     left: float | None = None
 
 
+class Extent(NamedTuple):
+    """What is known of one task at all, in seconds."""
+
+    low: float
+    """The least task time of any robot; infinite if none is known."""
+    high: float
+    """The greatest; minus infinity if none is known."""
+    longest: float
+    """The greatest time by samples alone, whatever has failed since; 0 if there is none."""
+    of_teammates: bool
+    """Whether a teammate's time is known."""
+
+
 class _Performance:
     """Samples of one robot."""
 
-    __slots__ = ("floor", "floor_left", "samples", "time")
+    __slots__ = ("floor", "floor_left", "measured", "samples", "time")
 
     def __init__(self, trials: int, record: Record) -> None:
         self.samples: deque[float] = deque(record.samples, maxlen=trials)
         self.floor_left = min(record.floor_left, trials)
         self.floor = record.floor if self.floor_left > 0 else 0.0
         self.time: float | None = None
+        self.measured = 0.0
         self.refresh()
 
     def refresh(self) -> None:
-        """Compute the task time anew; None while there is no sample."""
+        """Compute the task time anew, and the time by the samples alone; None and 0 while there is no sample."""
         self.time = task_time(self.samples, self.floor) if self.samples else None
+        self.measured = (task_time(self.samples) if self.floor else self.time or 0.0) if self.samples else 0.0
 
 
 class Monitor:
@@ -72,10 +90,12 @@ class Monitor:
         self._collision = parameters.effective_collision_window
         self._tau = parameters.silence_timeout
         self._performances: dict[str, _Performance] = {}
-        self._attempts: dict[str, _Attempt] = {}
+        self._attempts: dict[str, Attempt] = {}
+        self._anybody_left = False
         self._earlier = 0
-        #: Grows with each change of what is known.
-        self.version = 0
+        self._extent: Extent | None = None
+        #: Told of each change of what is known.
+        self.on_change: Callable[[], None] = lambda: None
 
     def new_trial(self) -> None:
         """Forget the attempts; keep what was learned."""
@@ -90,10 +110,10 @@ class Monitor:
             return False
         if attempt is not None:
             self._fail(robot, attempt)
-        self._attempts[robot] = _Attempt(now - active_for, now, active_for)
+        self._attempts[robot] = Attempt(now - active_for, now, active_for)
         return True
 
-    def _goes_on(self, attempt: _Attempt, now: float, active_for: float) -> bool:
+    def _goes_on(self, attempt: Attempt, now: float, active_for: float) -> bool:
         """Whether a message belongs to `attempt`: not one begun after it, and not one begun while nothing was heard."""
         begun_later = more_than(now - active_for, attempt.last + self._tau)
         return active_for >= attempt.active_for - SLACK and not begun_later
@@ -103,17 +123,34 @@ class Monitor:
         attempt = self._attempts.get(robot)
         if attempt is not None and attempt.left is None:
             attempt.left = now
+            self._anybody_left = True
 
     def settle(self, now: float) -> None:
         """Judge the attempts whose robots left more than tau ago: no completion can be on its way any more."""
+        if not self._anybody_left:
+            return
         for robot in [name for name, one in self._attempts.items() if one.left is not None]:
             attempt = self._attempts[robot]
             if attempt.left is not None and more_than(now - attempt.left, self._tau):
                 self._fail(robot, attempt)
+        self._anybody_left = any(one.left is not None for one in self._attempts.values())
+
+    def settles_at(self) -> float:
+        """The instant after which `settle` has something to judge."""
+        if not self._anybody_left:
+            return math.inf
+        left = [attempt.left for attempt in self._attempts.values() if attempt.left is not None]
+        return min(left, default=math.inf) + self._tau
+
+    def continued(self, robot: str, now: float, active_for: float) -> Attempt | None:
+        """The attempt that a message of `robot`, on the task since `active_for` seconds, goes on with, if there is one."""
+        attempt = self._attempts.get(robot)
+        goes_on = attempt is not None and attempt.left is None and self._goes_on(attempt, now, active_for)
+        return attempt if goes_on else None
 
     def began(self, now: float) -> None:
         """The robot itself begins an attempt."""
-        self._attempts[self._me] = _Attempt(now, now, 0.0)
+        self._attempts[self._me] = Attempt(now, now, 0.0)
 
     def ceased(self, now: float, *, failed: bool) -> None:
         """The robot itself ends its attempt, and the task is not complete; it knows why, however short the attempt was."""
@@ -151,7 +188,7 @@ class Monitor:
         candidates = lasting or list(self._attempts)
         return candidates[0] if len(candidates) == 1 and self._earlier == 0 else None
 
-    def _fail(self, robot: str, attempt: _Attempt, *, failed: bool = True, short: bool = True) -> None:
+    def _fail(self, robot: str, attempt: Attempt, *, failed: bool = True, short: bool = True) -> None:
         """End an attempt without completion; a `short` one that may have ended in a collision is as if it had never been."""
         del self._attempts[robot]
         elapsed = attempt.last - attempt.started
@@ -173,11 +210,14 @@ class Monitor:
         self._changed(known)
 
     def _of(self, robot: str) -> _Performance:
-        return self._performances.setdefault(robot, _Performance(self._trials, Record(())))
+        if robot not in self._performances:
+            self._performances[robot] = _Performance(self._trials, Record(()))
+        return self._performances[robot]
 
     def _changed(self, known: _Performance) -> None:
         known.refresh()
-        self.version += 1
+        self._extent = None
+        self.on_change()
 
     def task_time(self, robot: str) -> float | None:
         """task_time_i(k, j, t) in seconds; None while no time of `robot` is known."""
@@ -189,13 +229,18 @@ class Monitor:
         known = self._performances.get(robot)
         return 0.0 if known is None else known.floor
 
-    def times(self) -> Iterable[tuple[str, float]]:
-        """Each robot whose time is known, with that time in seconds."""
-        return [(robot, known.time) for robot, known in self._performances.items() if known.time is not None]
-
-    def measured(self) -> Iterable[float]:
-        """The time of each robot by its samples alone, whatever has failed since, in seconds."""
-        return [task_time(known.samples) for known in self._performances.values() if known.samples]
+    def extent(self) -> Extent:
+        """The range of the times known."""
+        if self._extent is None:
+            known = self._performances
+            times = {robot: one.time for robot, one in known.items() if one.time is not None}
+            self._extent = Extent(
+                min(times.values(), default=math.inf),
+                max(times.values(), default=-math.inf),
+                max((one.measured for one in known.values()), default=0.0),
+                any(robot != self._me for robot in times),
+            )
+        return self._extent
 
     def count(self, robot: str) -> int:
         """The number of samples kept of `robot`, at most mu."""
@@ -212,4 +257,5 @@ class Monitor:
     def restore(self, records: Mapping[str, Record]) -> None:
         """Take what was learned in earlier missions."""
         self._performances = {robot: _Performance(self._trials, record) for robot, record in records.items()}
-        self.version += 1
+        self._extent = None
+        self.on_change()

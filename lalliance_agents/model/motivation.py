@@ -6,9 +6,33 @@ value at any later step follows without having taken the steps between. A driver
 changes gets the same numbers, to the last bit, as one that takes them all.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 from lalliance_agents.model.events import Factors
+
+
+@dataclass(slots=True)
+class Expectation:
+    """What a robot expects of a task, as long as nobody comes or goes, starts or ceases, and nothing is learned."""
+
+    learned: int
+    """The version of the knowledge behind it."""
+    present: Sequence[str]
+    """The teammates present."""
+    contended: bool
+    """Whether a teammate is on the task."""
+    own_time: float
+    """task_time_i(i, j, t), in seconds."""
+    best_time: float
+    """The least task time of the robots present, in seconds."""
+    category: int
+    fast: float
+    """delta_fast, in motivation per second."""
+    psi: float
+    lambda_: float
+    held: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """phi in seconds and delta_slow, of each teammate that was asked for."""
 
 
 @dataclass(slots=True)
@@ -27,6 +51,8 @@ class Motivation:
     applicable: bool = False
     complete: bool = False
     body_failed: bool = False
+    expectation: Expectation | None = None
+    """What was last expected of the task."""
     factors: Factors | None = None
     """What produced the motivation at the last step."""
 
@@ -42,6 +68,11 @@ class Motivation:
     def hold(self, value: float, now: float) -> None:
         """Stay at `value`."""
         self.base, self.since, self.rate = value, now, 0.0
+
+    def suppress(self, now: float) -> None:
+        """Be 0 because another set is active; of the other factors nothing is known."""
+        self.hold(0.0, now)
+        self.factors = None
 
     def activate(self, now: float, expected: float) -> None:
         """Become the robot's active set; the value is kept while it is."""

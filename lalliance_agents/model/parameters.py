@@ -16,6 +16,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSeriali
 #: Slack of every comparison of two instants or two times, in seconds (erratum 7).
 SLACK = 1e-9
 
+#: How much before a change it foresees a robot wants to be woken, in seconds: far more than rounding, far less than a step.
+EARLY = 1e-6
+
 Strategy = IntEnum("Strategy", "I II III")
 Strategy.__doc__ = """Who is trusted (Table 1): I distrust teammates, II let the best robot win, III fighting chance."""
 

@@ -66,6 +66,10 @@ class Kind(StrEnum):
     ALIVE = "alive/{robot}"
 
 
+#: What a robot says of its being there, on a task or idle: one stream, numbered and replaced as one.
+PRESENCE = frozenset({Kind.ACTIVITY, Kind.HEARTBEAT})
+
+
 class Key(NamedTuple):
     """A key taken apart."""
 
@@ -81,7 +85,7 @@ class Key(NamedTuple):
     @property
     def stream(self) -> tuple[str | None, str | None]:
         """What a newer message replaces: all activity and heartbeats of a robot are one stream, its presence."""
-        if self.kind in {Kind.ACTIVITY, Kind.HEARTBEAT}:
+        if self.kind in PRESENCE:
             return ("presence", self.robot)
         return (self.kind.format(robot=self.robot, task=self.task), None)
 
@@ -123,7 +127,7 @@ class Keys:
                 names = _match(shape, chunks)
                 if names is not None:
                     return Key(kind, **names)
-        raise MessageError("key", f"{key[:80]!r} is not a key of this mission")
+        raise MessageError("key", f"{repr(key[:80])[:80]} is not a key of this mission")
 
 
 def _match(shape: tuple[str, ...], chunks: list[str]) -> dict[str, str] | None:

@@ -4,7 +4,8 @@ The header says which version of this schema the sender speaks, who it is, which
 restarted robot is not its ghost), and where in that life (`seq`). `at` is the sender's own mission time and informative:
 nothing compares the clocks of two machines. Fields that a receiver does not know are ignored, so that fields can be added;
 any other change is a new version. Whatever bytes come in, `decode` returns a checked message or raises `MessageError`, whose
-text is one short line; telling what is wrong with a large message takes hardly longer than reading a right one.
+text is one short line; telling what is wrong with a large message takes hardly longer than reading a right one, and what a
+message claims to hold takes no room before it is there.
 """
 
 from typing import Annotated, Any, Literal, TypeVar
@@ -20,20 +21,23 @@ VERSION: Literal[1] = 1
 #: Larger messages are dropped unread, in bytes: room for the status of a mission with a thousand tasks.
 MAX_PAYLOAD = 128 * 1024
 
-#: With more faults than this the first is not looked up: pydantic would spell out all of them.
-_MOST_FAULTS = 20
-
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Sender = Annotated[str, Field(pattern=SENDER_PATTERN)]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
 #: The longest time that can be said, in seconds.
 LONGEST = 1e12
 Seconds = Annotated[float, Field(ge=0, le=LONGEST)]
-Word = Annotated[str, Field(max_length=40)]
+#: Letters that a word may have.
+LONGEST_WORD = 40
+Word = Annotated[str, Field(max_length=LONGEST_WORD)]
 #: Letters that a line of text may have.
 LONGEST_LINE = 500
+#: Letters that a fault in a command may have.
+LONGEST_FAULT = 2000
 Line = Annotated[str, Field(max_length=LONGEST_LINE)]
-Scalars = dict[str, str | int | float | bool | None]
+#: Belongs to every list and every map in a message: to spell out all the faults of a large one takes very long.
+FIRST_FAULT = Field(fail_fast=True)
+Scalars = Annotated[dict[str, str | int | float | bool | None], FIRST_FAULT]
 
 
 class Message(BaseModel):
@@ -70,7 +74,7 @@ class Heartbeat(Message):
 class Hello(Message):
     """The tasks a robot can do; used only to choose whom to listen to."""
 
-    tasks: Annotated[list[Name], Field(fail_fast=True)]
+    tasks: Annotated[list[Name], FIRST_FAULT]
 
 
 class Action(Message):
@@ -98,7 +102,7 @@ class BodyState(Message):
     mission: Literal["waiting", "running", "complete", "failed"]
     trial: Count
     learning: Literal["active", "adaptive"]
-    failures: Annotated[list[str], Field(fail_fast=True)] = []
+    failures: Annotated[list[str], FIRST_FAULT] = []
 
 
 class DecisionMade(Message):
@@ -111,14 +115,14 @@ class DecisionMade(Message):
     active_for: Seconds
     trial: Count
     factors: Scalars
-    teammates: Annotated[list[Scalars], Field(fail_fast=True)]
+    teammates: Annotated[list[Scalars], FIRST_FAULT]
 
 
 class Motivations(Message):
     """All motivations of a robot, each with its factors."""
 
-    active: Annotated[list[Name], Field(fail_fast=True)]
-    sets: dict[Name, Scalars]
+    active: Annotated[list[Name], FIRST_FAULT]
+    sets: Annotated[dict[Name, Scalars], FIRST_FAULT]
 
 
 class Reception(BaseModel):
@@ -147,10 +151,10 @@ class LinkReport(Message):
 
     sent: Count
     received: Count
-    dropped: dict[str, Count]
+    dropped: Annotated[dict[str, Count], FIRST_FAULT]
     """Messages not used, by reason."""
-    teammates: dict[Name, Reception]
-    effects: Annotated[list[Effect], Field(fail_fast=True)] = []
+    teammates: Annotated[dict[Name, Reception], FIRST_FAULT]
+    effects: Annotated[list[Effect], FIRST_FAULT] = []
     """What faults did to messages on their arrival here."""
     ticks: Count
     missed: Count
@@ -179,11 +183,11 @@ class Status(Message):
     trials: Count
     learning: Literal["active", "adaptive"]
     elapsed: Seconds
-    tasks: dict[Name, Scalars]
-    robots: dict[Name, Scalars]
+    tasks: Annotated[dict[Name, Scalars], FIRST_FAULT]
+    robots: Annotated[dict[Name, Scalars], FIRST_FAULT]
 
 
-Globs = Annotated[list[Annotated[str, Field(max_length=64)]], Field(fail_fast=True)]
+Globs = Annotated[list[Annotated[str, Field(max_length=64)]], FIRST_FAULT]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
@@ -227,15 +231,15 @@ class ChaosRules(Message):
     """All that is in force of faults made where messages arrive."""
 
     seed: Count
-    rules: Annotated[list[LinkRule], Field(fail_fast=True)] = []
-    blind: Annotated[list[Blindness], Field(fail_fast=True)] = []
+    rules: Annotated[list[LinkRule], FIRST_FAULT] = []
+    blind: Annotated[list[Blindness], FIRST_FAULT] = []
 
 
 class ChaosCommand(Message):
     """What an operator asks of the world."""
 
     verb: Literal["inject", "heal", "status"]
-    fault: str = Field(default="", max_length=2000)
+    fault: str = Field(default="", max_length=LONGEST_FAULT)
     """inject: the fault as JSON, in the fields of a mission file; `at` is the present instant."""
     lasts: Seconds | None = None
     """inject: how long it is in force, in seconds; None: what the fault itself says."""
@@ -248,7 +252,7 @@ class ChaosAnswer(Message):
 
     done: bool
     text: Line
-    faults: Annotated[list[Scalars], Field(fail_fast=True)] = []
+    faults: Annotated[list[Scalars], FIRST_FAULT] = []
     """Every fault of the mission, in the words of the summary."""
 
 
@@ -305,19 +309,29 @@ def decode(kind: type[M], payload: bytes) -> M:
 
 
 def _first_fault(error: ValidationError) -> str:
-    if error.error_count() > _MOST_FAULTS:
-        return f"{error.error_count()} faults"
     first = error.errors(include_url=False, include_input=False)[0]
-    # A place can hold any text that came as a key of a map.
+    # A place can hold any text that came as a key of a map, and each letter of it can take ten when it is spelled out.
     where = ".".join(str(part) for part in first["loc"])[:80]
-    return f"{where if where.isprintable() else repr(where)}: {first['type']}"
+    return f"{(where if where.isprintable() else repr(where))[:80]}: {first['type']}"
 
 
 def _unpack(payload: bytes) -> Any:
     try:
+        _walk(payload)
         return msgpack.unpackb(payload)
     except Exception as error:
         raise MessageError("msgpack", type(error).__name__) from None
+
+
+def _walk(payload: bytes) -> None:
+    """Go through a document and keep nothing, so that only a whole one is unpacked.
+
+    For a list msgpack makes room as soon as its length is claimed: a thousand lists in one another, each of a length that
+    the payload might just hold, cost up to a gigabyte. In a whole document all lengths together fit into the payload.
+    """
+    walker = msgpack.Unpacker(read_size=1)
+    walker.feed(payload)
+    walker.skip()
 
 
 def decode_at(key: Key, payload: bytes) -> Message:

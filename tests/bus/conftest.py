@@ -1,4 +1,4 @@
-"""The buses under test: an in-memory hub, and a router with real sessions on loopback, behind one `Team`.
+"""The buses under test: an in-memory hub, bare and through faults that hit nothing, and a router with real sessions.
 
 A `Team` makes participants and closes what a test leaves open. `mortal` is a participant that announces a presence and can
 be killed without a goodbye: on the real bus that is a process of its own. Nothing here sleeps for a fixed time; `eventually`
@@ -16,9 +16,14 @@ from typing import Any, Self
 import pytest
 
 from lalliance_agents.bus.base import Bus, Delivery
+from lalliance_agents.bus.faulty import FaultyBus
+from lalliance_agents.bus.link import LinkRules
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.router import free_endpoint, open_router
 from lalliance_agents.bus.zenoh_bus import open_bus
+from lalliance_agents.clock import MissionClock
+from lalliance_agents.wire.keys import Keys
+from lalliance_agents.wire.messages import LinkRule
 
 PATIENCE = 20.0
 
@@ -104,6 +109,29 @@ class MemoryTeam:
         return kill
 
 
+class FaultyMemoryBus(FaultyBus):
+    """A memory bus behind faults: on any pattern they look at what comes, and let it all through."""
+
+    def __init__(self, inner: MemoryBus) -> None:
+        super().__init__(inner, Keys("m"), "me", MissionClock())
+        self._memory = inner
+        self._touchable = ["**"]
+        self._links = LinkRules(0, [LinkRule(fault="f", senders=["nobody"], receivers=["me"], cut=True)])
+
+    @property
+    def dropped_overflow(self) -> int:
+        return self._memory.dropped_overflow
+
+    @property
+    def dropped_oversize(self) -> int:
+        return self._memory.dropped_oversize
+
+
+class FaultyTeam(MemoryTeam):
+    async def bus(self) -> Bus:
+        return await self._stack.enter_async_context(FaultyMemoryBus(MemoryBus(self._hub)))
+
+
 class ZenohTeam:
     def __init__(self, stack: AsyncExitStack, endpoint: str) -> None:
         self._stack = stack
@@ -164,11 +192,13 @@ class Watch:
                 await self._grown.wait()
 
 
-@pytest.fixture(params=["memory", "zenoh"])
+@pytest.fixture(params=["memory", "faulty", "zenoh"])
 async def team(request: pytest.FixtureRequest) -> AsyncIterator[MemoryTeam | ZenohTeam]:
     async with AsyncExitStack() as stack:
         if request.param == "memory":
             yield MemoryTeam(stack)
+        elif request.param == "faulty":
+            yield FaultyTeam(stack)
         else:
             router = await stack.enter_async_context(await open_router(free_endpoint()))
             yield ZenohTeam(stack, router.endpoint)

@@ -45,12 +45,24 @@ def test_lines_carry_the_time_of_the_trial() -> None:
     )
     assert picture.take(status, now=40.0) is None
     assert picture.take(decision("activate", "free"), now=42.5) == "   32.5 s  left starts a: nobody is on it"
-    event = Event(
-        **HEADER, kind="order", elapsed=31.0, trial=1, text="kill left", details={"deed": "kill", "number": 0}
-    )
-    assert picture.take(event, now=43.0) == "   31.0 s  kill left"
-    assert picture.take(event.model_copy(update={"details": {"deed": "start"}}), now=43.0) is None
+    event = Event(**HEADER, kind="gone", elapsed=31.0, trial=1, text="left is gone")
+    assert picture.take(event, now=43.0) == "   31.0 s  left is gone"
     assert len(picture.events) == 2
+
+
+def test_faults_are_told_and_kept_while_they_are_in_force_and_orders_are_not() -> None:
+    picture = Picture()
+
+    def tell(kind: str, text: str) -> str | None:
+        return picture.take(Event(**HEADER, kind=kind, elapsed=31.0, trial=1, text=text), now=31.0)
+
+    assert tell("fault", "fault: crash of left") == "   31.0 s  fault: crash of left"
+    assert tell("order", "kill left: crash at 31 s") is None
+    assert tell("fault", "fault: loss 30% from * to left") is not None
+    assert picture.faults == ["crash of left", "loss 30% from * to left"]
+    assert tell("fault", "fault is over: crash of left") == "   31.0 s  fault is over: crash of left"
+    assert tell("fault", "fault is over: what never was") is not None
+    assert picture.faults == ["loss 30% from * to left"]
 
 
 def test_nothing_that_is_printed_changes_the_terminal() -> None:

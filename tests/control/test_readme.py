@@ -6,9 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 from support.processes import MISSIONS, Processes, read_until
 
 from lalliance_agents.bus.router import free_endpoint
+from lalliance_agents.faults import LinkFault, kind_of
+from lalliance_agents.mission_file import parse_mission
 
 README = (MISSIONS.parent / "README.md").read_text()
 
@@ -33,7 +36,8 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
 
 
 TOGETHER = [block for block in blocks("console") if "lalliance router" in block]
-ALONE = [command for block in blocks("console") if block not in TOGETHER for command in commands(block)]
+CHAOS = [block for block in blocks("console") if "lalliance chaos" in block]
+ALONE = [command for block in blocks("console") if block not in TOGETHER + CHAOS for command in commands(block)]
 
 
 @pytest.mark.parametrize("command", ALONE, ids=" ".join)
@@ -69,7 +73,33 @@ def test_the_single_processes_make_a_team(processes: Processes) -> None:
         assert member.returncode == 0
 
 
+def test_faults_are_injected_and_healed_while_a_mission_runs(processes: Processes) -> None:
+    running = processes.start("run", MISSIONS / "material_handling.yaml", "--plain")
+    read_until(running, "pusher starts")
+    [block] = CHAOS
+    said = [processes.chaos(*command[1:]) for command in commands(block)]
+    assert [line.split(":")[0] for line in said] == [
+        "2-hang", "3-link", "4-partition", "Mission material_handling", "healed 2-hang, 3-link, 4-partition"
+    ]  # fmt: skip
+    assert re.search("^2-hang .* fired at", said[3], flags=re.MULTILINE)
+    assert "partition lifter carrier | pusher forklift" in said[3]
+
+
+def test_each_example_of_a_fault_is_one_and_every_kind_has_an_example() -> None:
+    examples = re.findall(r"^\| \w+ \| `(\{.*?\})` \|", README, flags=re.MULTILINE)
+    mission = (MISSIONS / "material_handling.yaml").read_text()
+    assert {kind_of(parse_mission(planned(mission, one), "m.yaml").faults[0]) for one in examples} == {
+        "crash", "hang", "stuck", "slow", "mute", "deaf", "blind", "link", "partition"
+    }  # fmt: skip
+    written = {field for one in examples for field in yaml.safe_load(one)}
+    assert written >= LinkFault.model_fields.keys() - {"held"}
+
+
+def planned(mission: str, fault: str) -> str:
+    return yaml.safe_dump(yaml.safe_load(mission) | {"faults": [yaml.safe_load(fault)]})
+
+
 def test_every_command_of_the_tool_is_in_the_readme(processes: Processes) -> None:
     listed = re.findall(r"^  (\w+)  ", processes.run("--help").stdout, flags=re.MULTILINE)
-    assert len(listed) == 6
+    assert len(listed) == 9
     assert [name for name in listed if f"lalliance {name}" not in README] == []

@@ -46,7 +46,8 @@ class Processes:
             stderr=subprocess.PIPE,
             text=True,
             cwd=self.folder,
-            env={**os.environ, _MARK: self._mark, "COLUMNS": "120"},
+            # Missions of other tests, which may have the same name, are not to be found.
+            env={**os.environ, _MARK: self._mark, "COLUMNS": "120", "XDG_RUNTIME_DIR": str(self.folder)},
         )
         self._started.append(process)
         return process
@@ -64,6 +65,12 @@ class Processes:
         document: dict[str, Any] = json.loads(done.stdout)
         return document
 
+    def chaos(self, mission: str | Path, *words: str | Path) -> str:
+        """Run a chaos command that must be carried out; what it printed."""
+        done = self.run("chaos", mission, *words)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.rstrip()
+
     def alive(self, command: str = "") -> list[int]:
         """The living processes of this tree, or those of them that run `command`, such as `router`, `robot` or `world`."""
         mark = f"{_MARK}={self._mark}".encode()
@@ -75,6 +82,16 @@ class Processes:
         return next(
             pid for pid, words in _commands(mark) if "robot" in words and words[words.index("--name") + 1] == name
         )
+
+
+def is_stopped(pid: int) -> bool:
+    """Whether the process is stopped, as by SIGSTOP."""
+    return (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0] == "T"
+
+
+def words_of(pid: int) -> list[str]:
+    """The command line of a process."""
+    return (Path("/proc") / str(pid) / "cmdline").read_text().rstrip("\0").split("\0")
 
 
 def _commands(mark: bytes) -> Iterator[tuple[int, list[str]]]:

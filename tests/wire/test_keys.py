@@ -77,6 +77,7 @@ def test_presence_is_one_stream_and_every_other_key_its_own() -> None:
         "heartbeat/left\n", "heartbeat/left\0", "heartbeat/@left", "heartbeat/le ft", "heartbeat/" + "x" * 65,
         "heartbeat/lëft", "heartbeat/left/x", "heartbeat/{robot}", "heartbeat", "", "mind/left/thought", "Heartbeat/left",
         "@chaos/rules/x", "world/event\n", "sense/task/a/b", "heartbeat/\ud800", "heartbeat/١٢", "body/left/action/..",
+        "\U000e0001" * 90,
     ],
 )  # fmt: skip
 def test_a_hostile_key_is_refused(rest: str) -> None:
@@ -84,6 +85,7 @@ def test_a_hostile_key_is_refused(rest: str) -> None:
         KEYS.parse(f"lalliance/warehouse/{rest}")
     assert refused.value.reason == "key"
     assert str(refused.value).isprintable()
+    assert len(str(refused.value)) < 200
 
 
 @settings(deadline=None)

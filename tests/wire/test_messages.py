@@ -2,12 +2,15 @@
 
 import random
 import time
+import tracemalloc
 from typing import Any
 
 import msgpack
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
+from wire.samples import valid
 
 from lalliance_agents.errors import MessageError
 from lalliance_agents.wire import messages
@@ -220,9 +223,34 @@ def test_a_message_with_very_many_faults_is_refused_quickly(kind: type[Message],
     assert time.process_time() - began < 0.4
 
 
+@pytest.mark.parametrize("kind", BODY_OF)
+@pytest.mark.parametrize("wrong", [[b""] * 1000, {f"*{number}": b"" for number in range(1000)}])
+def test_no_list_and_no_map_has_more_than_its_first_fault_looked_up(kind: Kind, wrong: object) -> None:
+    """Else whoever fills a map with faults costs a receiver many times what a right message does."""
+    document = valid(kind, random.Random(1)).document
+    for name, value in document.items():
+        for filling in (wrong, [wrong], {"a": wrong}):
+            if isinstance(value, list | dict):
+                with pytest.raises(ValidationError) as refused:
+                    BODY_OF[kind].model_validate({**document, name: filling})
+                assert refused.value.error_count() < 20, name
+
+
+@pytest.mark.parametrize("head", [b"\xdc\xff\xff", b"\xdd\0\x01\xe0\0", b"\xde\xff\xff", b"\xc6\0\x01\xe0\0"])
+@pytest.mark.parametrize("filling", [b"\xc0", b"\x80", b"\xc1"])
+def test_what_a_message_claims_to_hold_takes_no_room(head: bytes, filling: bytes) -> None:
+    """A list that claims 100,000 entries takes nearly a megabyte, and a payload has room for a thousand in one another."""
+    payload = (b"\x82\xa1v" + head * 1000).ljust(MAX_PAYLOAD, filling)
+    tracemalloc.start()
+    refusal(messages.Heartbeat, payload)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 10 * MAX_PAYLOAD
+
+
 def test_a_fault_is_told_in_one_short_line_whatever_name_it_has() -> None:
     shouting = {**HEADER, "sent": 1, "received": 1, "teammates": {}, "ticks": 1, "missed": 1}
-    for name in ("\nERROR all robots stop\x1b[2J", "x" * 100_000):
+    for name in ("\nERROR all robots stop\x1b[2J", "x" * 100_000, "\U000e0001" * 100):
         text = str(refusal(messages.LinkReport, {**shouting, "dropped": {name: -1}}))
         assert text.isprintable()
         assert len(text) < 200

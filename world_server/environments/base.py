@@ -102,6 +102,11 @@ class Environment(ABC):
     def sense(self) -> Mapping[str, TaskView]:
         """What every task of the mission looks like now, in the mission's order."""
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether every task is complete."""
+        return all(view.complete for view in self.sense().values())
+
 
 class EventDriven(Environment):
     """An environment in which all rates are constant between events, so that a step goes from event to event.

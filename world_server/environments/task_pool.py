@@ -180,6 +180,11 @@ class TaskPool(EventDriven):
         """See `Environment.sense`."""
         return {task: self._view(task) for task in self._work}
 
+    @property
+    def is_complete(self) -> bool:
+        """See `Environment.is_complete`."""
+        return len(self._complete) == len(self._work)
+
     def _view(self, task: str) -> TaskView:
         if task in self._complete:
             return TaskView(complete=True, applicable=False, progress=1.0)

@@ -1,0 +1,134 @@
+"""How much faster than real time the exact simulator is, on one core.
+
+Each row is one mission, run several times; the fastest run counts, as whatever else the machine does only slows a run down.
+Beside it the same mission with every control step made and every message taken in, which must give the same event log.
+
+    python benchmarks/simulator.py [--json FILE] [--runs N]
+"""
+
+import argparse
+import json
+import platform
+import random
+import sys
+import time
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from lalliance_agents.config import Mission
+from lalliance_study.simulator import Simulator
+
+#: robots, tasks, robots able to do each task, shortest and longest own time in seconds
+SHAPES = [(5, 10, 3, 10, 30), (10, 20, 3, 10, 30), (20, 40, 3, 10, 30), (20, 40, 3, 50, 150), (20, 40, 20, 10, 30)]
+
+
+def mission(robots: int, tasks: int, coverage: int, shortest: float, longest: float) -> Mission:
+    """A mission without faults at 10 control steps and 5 messages a second."""
+    chance = random.Random(1)
+    able: dict[str, dict[str, float]] = {f"r{number}": {} for number in range(robots)}
+    for number in range(tasks):
+        for robot in chance.sample(sorted(able), coverage):
+            able[robot][f"t{number}"] = round(chance.uniform(shortest, longest), 2)
+    return Mission.model_validate(
+        {
+            "name": "benchmark",
+            "tasks": {f"t{number}": {} for number in range(tasks)},
+            "robots": {robot: {"tasks": times} for robot, times in able.items() if times},
+            "knowledge": "given",
+            "parameters": {"min_delay": 0.1, "max_delay": 0.5},
+            "deadline": 100_000.0,
+            "seed": 1,
+        }
+    )
+
+
+def measure(what: Mission, *, every_step: bool, runs: int) -> tuple[Simulator, float]:
+    """A finished simulator, and the least CPU time of `runs` runs in seconds."""
+    least = float("inf")
+    for _ in range(runs):
+        simulator = Simulator(what, every_step=every_step)
+        began = time.process_time()
+        simulator.run()
+        least = min(least, time.process_time() - began)
+    return simulator, least
+
+
+def rows(runs: int) -> list[dict[str, Any]]:
+    """One row per shape of mission."""
+    found = []
+    for shape in SHAPES:
+        what = mission(*shape)
+        simulator, seconds = measure(what, every_step=False, runs=runs)
+        plain, plain_seconds = measure(what, every_step=True, runs=max(runs // 4, 1))
+        if simulator.log != plain.log:
+            sys.exit(f"the logs of {shape} differ")
+        members = simulator.members.values()
+        found.append(
+            {
+                "robots": shape[0],
+                "tasks": shape[1],
+                "coverage": shape[2],
+                "own_times": shape[3:],
+                "virtual_seconds": simulator.now,
+                "cpu_seconds": seconds,
+                "times_real_time": simulator.now / seconds,
+                "missions_per_second": 1 / seconds,
+                "every_step_cpu_seconds": plain_seconds,
+                "ratio": plain_seconds / seconds,
+                "steps": sum(member.steps for member in members),
+                "steps_of_all": sum(member.steps for member in plain.members.values()),
+            }
+        )
+    return found
+
+
+def main() -> None:
+    """Print a table and write a JSON file if one is named."""
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("--json", type=Path, help="where to write the figures")
+    arguments.add_argument("--runs", type=int, default=8, help="runs of each mission")
+    chosen = arguments.parse_args()
+    measured = rows(chosen.runs)
+    table = Table(title="Exact simulator, one core", title_justify="left", box=None, pad_edge=False)
+    for column in (
+        "robots",
+        "tasks",
+        "coverage",
+        "own times",
+        "virtual",
+        "CPU",
+        "x real time",
+        "missions/s",
+        "steps made",
+    ):
+        table.add_column(column, justify="right")
+    table.add_column("gain", justify="right")
+    for row in measured:
+        table.add_row(
+            str(row["robots"]),
+            str(row["tasks"]),
+            str(row["coverage"]),
+            "{}-{} s".format(*row["own_times"]),
+            f"{row['virtual_seconds']:.0f} s",
+            f"{row['cpu_seconds'] * 1000:.0f} ms",
+            f"{row['times_real_time']:.0f}",
+            f"{row['missions_per_second']:.1f}",
+            f"{row['steps'] / row['steps_of_all']:.0%}",
+            f"{row['ratio']:.1f}",
+        )
+    Console().print(table)
+    if chosen.json is not None:
+        machine = {
+            "python": platform.python_version(),
+            "machine": platform.machine(),
+            "lalliance": version("lalliance"),
+        }
+        chosen.json.write_text(json.dumps({"machine": machine, "simulator": measured}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""Samples on their way to handlers that are to get them later.
+
+One timer waits for the first that is due. What is due at once is delivered in the order in which it came, and no more in one
+turn of the loop than an inbox delivers. All that waits is limited, so that a flood of delayed samples cannot fill the memory.
+"""
+
+import asyncio
+import heapq
+
+from lalliance_agents.bus.base import Sample
+from lalliance_agents.bus.inbox import BATCH, Inlet
+from lalliance_agents.clock import MissionClock
+
+#: Size of all that waits, in bytes: of each sample the payload, and `OVERHEAD` for the rest. Some 28,000 announcements.
+MOST_LATE = 2**24
+OVERHEAD = 512
+
+
+class DelayLine:
+    """What waits to be delivered.
+
+    Args:
+        clock: mission time.
+    """
+
+    def __init__(self, clock: MissionClock) -> None:
+        self._clock = clock
+        # A heap by due time; of two due at once the first that came, which is why they are numbered.
+        self._waiting: list[tuple[float, int, Inlet[Sample], Sample]] = []
+        self._pushed = 0
+        self._size = 0
+        self._timer: asyncio.TimerHandle | None = None
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def push(self, delay: float, inlet: Inlet[Sample], sample: Sample) -> bool:
+        """Have the sample delivered in `delay` mission seconds; whether there was room for it."""
+        size = _size(sample)
+        if self._size + size > MOST_LATE:
+            return False
+        self._size += size
+        self._pushed += 1
+        heapq.heappush(self._waiting, (self._clock.now() + delay, self._pushed, inlet, sample))
+        if self._waiting[0][1] == self._pushed:
+            self._arm()
+        return True
+
+    def discard(self, inlet: Inlet[Sample] | None = None) -> None:
+        """Let go of what waits for `inlet`; without one, of all."""
+        self._waiting = [] if inlet is None else [late for late in self._waiting if late[2] is not inlet]
+        heapq.heapify(self._waiting)
+        self._size = sum(_size(late[3]) for late in self._waiting)
+        self._arm()
+
+    def _arm(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._clock.call_at(self._waiting[0][0], self._deliver) if self._waiting else None
+
+    def _deliver(self) -> None:
+        """Deliver what is due, but no more in one turn of the loop than an inbox does."""
+        # A timer may come early by a rounding; the first is due all the same.
+        now = max(self._clock.now(), self._waiting[0][0])
+        try:
+            for _ in range(BATCH):
+                if not self._waiting or self._waiting[0][0] > now:
+                    break
+                _, _, inlet, sample = heapq.heappop(self._waiting)
+                self._size -= _size(sample)
+                inlet.deliver(sample)
+        finally:
+            self._arm()
+
+
+def _size(sample: Sample) -> int:
+    return len(sample.payload) + OVERHEAD

@@ -1,0 +1,138 @@
+"""What goes through the air between simulated robots, without a look at the many messages that say nothing new.
+
+A robot says several times a second what it is on. All that such a refresh changes at the hearer is when it last heard the
+teammate, and that matters only when it is next asked. So a message waits at its link until the hearer looks, and of a row of
+refreshes it then takes the last; only a message that may be news wakes the hearer when it comes. A message may be news if it
+says something else than the message before on the same link, if it comes out of order, or after a silence that the hearer may
+have noticed.
+"""
+
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from lalliance_agents.bus.link import RuledLink
+from lalliance_agents.model.events import Heard
+
+
+class Spoken(NamedTuple):
+    """One message on its way to one hearer."""
+
+    arrives: float
+    incarnation: int
+    seq: int
+    trial: int
+    content: object
+    """What it says, as an object of its own: refreshes share it."""
+    heard: Heard
+
+
+class Hearer(Protocol):
+    """Whoever listens at the end of a link."""
+
+    name: str
+    tau: float
+    trial: int
+
+
+#: A silence is news a little before the hearer could notice it, in seconds.
+EARLY = 1e-6
+
+
+class AirLink:
+    """The way of one robot's messages to one teammate.
+
+    Args:
+        sender: the robot's name.
+        hearer: the teammate.
+        announce_news: called with the instant at which a message comes that may be news.
+        every_step: whether every message is taken for news.
+    """
+
+    def __init__(
+        self, sender: str, hearer: Hearer, announce_news: Callable[[float], None], *, every_step: bool
+    ) -> None:
+        self.sender = sender
+        self.hearer = hearer
+        self.rule: RuledLink | None = None
+        self.waiting: deque[Spoken] = deque()
+        self.received = self.stale = self.strange = self.lost = 0
+        #: fault -> messages that it touched.
+        self.effects: Counter[str] = Counter()
+        self._announce_news = announce_news
+        self._every_step = every_step
+        self._content: object = None
+        self._latest = 0.0
+        self._incarnation = self._seq = -1
+
+    def __repr__(self) -> str:
+        return f"<link {self.sender} -> {self.hearer}, {len(self.waiting)} waiting>"
+
+    def forget(self) -> None:
+        """Whatever comes next is news: the hearer has changed its mind, not the speaker."""
+        self._content = None
+
+    def reset(self) -> None:
+        """The hearer begins a new life, which has heard nothing."""
+        self.waiting.clear()
+        self._content = None
+        self._incarnation = self._seq = -1
+        self.received = self.stale = self.strange = self.lost = 0
+        self.effects.clear()
+
+    def send(self, spoken: Spoken) -> None:
+        """A message is on its way; `arrives` is when it would come if no rule touched it."""
+        if self.rule is None:
+            self._put(spoken)
+            return
+        verdict = self.rule.verdict(spoken.incarnation, spoken.seq)
+        self.effects.update(verdict.faults)
+        if not verdict.delays:
+            self.lost += 1
+        for late in verdict.delays:
+            self._put(spoken if late == 0.0 else self._delayed(spoken, late))
+
+    def _delayed(self, spoken: Spoken, late: float) -> Spoken:
+        # What is under way for about as long as a silence that would be noticed is a thing of its own.
+        content = spoken.content if late < self.hearer.tau / 2 else object()
+        return spoken._replace(arrives=spoken.arrives + late, content=content)
+
+    def _put(self, spoken: Spoken) -> None:
+        arrives = spoken.arrives
+        gap = arrives - self._latest
+        if spoken.content is self._content and 0.0 <= gap <= self.hearer.tau - EARLY and not self._every_step:
+            self._latest = arrives
+            self.waiting.append(spoken)
+            return
+        self._content = spoken.content
+        if gap >= 0.0:
+            self._latest = arrives
+            self.waiting.append(spoken)
+        else:
+            later = [one for one in self.waiting if one.arrives > arrives]
+            for _ in later:
+                self.waiting.pop()
+            self.waiting.append(spoken)
+            self.waiting.extend(later)
+        self._announce_news(arrives)
+
+    def take(self, now: float, *, each: bool) -> list[Spoken]:
+        """What has come until `now` and is fresh: of a row of refreshes the last, or `each` of them."""
+        waiting, taken = self.waiting, []
+        last: Spoken | None = None
+        while waiting and waiting[0].arrives <= now:
+            spoken = waiting.popleft()
+            if (spoken.incarnation, spoken.seq) <= (self._incarnation, self._seq):
+                self.stale += 1
+                continue
+            self._incarnation, self._seq = spoken.incarnation, spoken.seq
+            self.received += 1
+            if spoken.trial != self.hearer.trial:
+                self.strange += 1
+                continue
+            if last is not None and (each or last.content is not spoken.content):
+                taken.append(last)
+            last = spoken
+        if last is not None:
+            taken.append(last)
+        return taken

@@ -1,0 +1,331 @@
+"""One robot of a simulated team: its mind on its own grid of control steps, its ears, and its process as faults make it.
+
+The mind is the very one that runs on the bus. Of its control steps only those are made in which something may happen: the
+mind says when that is (`Mind.wake`, `Mind.next_lapse`), events make it sooner, and where nothing but an announcement is due it
+only beats. The result is the same as if all steps had been made; `every_step` makes them all, to show it.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable
+from enum import Enum
+
+from lalliance_agents.agent import translate
+from lalliance_agents.agent.behavior import TaskSense
+from lalliance_agents.agent.briefing import chance_of, new_mind, roster, tasks_of
+from lalliance_agents.config import Mission
+from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, Heard, TrialStarted
+from lalliance_agents.model.mind import Mind
+from lalliance_agents.model.parameters import SLACK
+from lalliance_agents.wire.messages import Effect
+from lalliance_study.air import AirLink, Spoken
+
+
+class Process(Enum):
+    """How a robot's process is."""
+
+    GONE = "gone"
+    RUNNING = "running"
+    STOPPED = "stopped"
+
+
+#: What a member tells the simulator: a decision, and that its next step has changed.
+Decided = Callable[["Member", Decision], None]
+Rescheduled = Callable[["Member"], None]
+#: Told when, which robot senses of which task whether it is applicable, and complete.
+SensedHook = Callable[[float, str, str, bool, bool], None]
+
+
+class Member:
+    """One robot.
+
+    Args:
+        mission: its mission.
+        name: which robot.
+        message_delay: how long each of its messages is under way, in seconds.
+        every_step: whether to make all control steps and to take in all messages.
+        decided: called with each decision.
+        rescheduled: called when `due` has changed.
+        sensed: called when a task is sensed to stand otherwise than before.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        name: str,
+        *,
+        message_delay: float,
+        every_step: bool,
+        decided: Decided,
+        rescheduled: Rescheduled,
+        sensed: SensedHook | None = None,
+    ) -> None:
+        self.name = name
+        self.tasks = tasks_of(mission, name)
+        self.process = Process.GONE
+        self.incarnation = 0
+        self.trial = 0
+        self.tau = mission.parameters_of(name).silence_timeout
+        self.sent = self.steps = self.beats = 0
+        #: Links to those who hear it on a task, and idle.
+        self.heard_on: dict[str, list[AirLink]] = {task: [] for task in self.tasks}
+        self.heard_idle: list[AirLink] = []
+        #: Links from those whom it hears.
+        self.hears: list[AirLink] = []
+        #: The instant of its next control step, in seconds; infinite while there is none.
+        self.due = math.inf
+        self.task: str | None = None
+        self.abilities = {mate: frozenset(mission.robots[mate].tasks) for mate in mission.teammates(name)}
+        self.effects: Counter[tuple[str, str]] = Counter()
+        self._mission = mission
+        self._delay = message_delay
+        self._every_step = every_step
+        self._decided = decided
+        self._rescheduled = rescheduled
+        self._sensed = sensed
+        self._period = mission.control_period
+        self._mind: Mind | None = None
+        self.stopped_at = 0.0
+        self._lived = self._missed = 0
+        #: Whether the bus has given it up since it was stopped.
+        self.given_up = False
+        self._told: dict[str, tuple[bool, bool]] = {}
+
+    def __repr__(self) -> str:
+        return f"<Member {self.name}: {self.process.value}, {self.task or 'idle'}, trial {self.trial}>"
+
+    @property
+    def mind(self) -> Mind:
+        """Its mind, in its present life."""
+        assert self._mind is not None  # noqa: S101 - asked only of a robot that was started
+        return self._mind
+
+    @property
+    def runs(self) -> bool:
+        """Whether its process runs."""
+        return self.process is Process.RUNNING
+
+    def start(self, now: float) -> None:
+        """Begin a new life."""
+        self.process = Process.RUNNING
+        self.incarnation += 1
+        chance = chance_of(self._mission, self.name, self.incarnation)
+        self._mind = new_mind(self._mission, self.name, chance, now=now)
+        self._mind.handle(roster(self._mission, self.name), now)
+        self.trial = 0
+        self.task = None
+        self._told.clear()
+        self._seq = 0
+        self._content: object = None
+        self._step = 0  # the control steps made or left out so far
+        self._first = now + chance.random() * self._period
+        self._after_pause = True
+        self._missed = 0
+        for link in self.hears:
+            self._keep(link)
+            link.reset()
+        self._wake_step = self._lapse_step = self._beat_step = 0
+        self._broadcast_due = now
+        self._schedule()
+
+    def periods(self, now: float) -> int:
+        """The control periods of all its lives so far, but for those in which it was stopped."""
+        return self._lived + (self._periods_here(now) if self.runs else 0)
+
+    def _periods_here(self, now: float) -> int:
+        return max(int((now - self._first) / self._period) + 1 - self._missed, 0)
+
+    def kill(self, now: float) -> None:
+        """End as by SIGKILL."""
+        if self.runs:
+            self._lived += self._periods_here(now)
+        self.process = Process.GONE
+        self.task = None
+        self._mind = None
+        self._schedule()
+
+    def stop(self, now: float) -> None:
+        """Stop as by SIGSTOP."""
+        if self.runs:
+            self.process = Process.STOPPED
+            self.stopped_at = now
+            self.given_up = False
+            # The steps before were made, if only in effect.
+            self.mind.rest(self._instant(self._step_from(now) - 1))
+            self._schedule()
+
+    def resume(self, now: float) -> bool:
+        """Go on as by SIGCONT; whether the bus had given the robot up meanwhile, and with it all that came."""
+        if self.process is not Process.STOPPED:
+            return False
+        self.process = Process.RUNNING
+        lost = self.given_up
+        for link in self.hears:
+            if lost:
+                link.waiting.clear()
+                link.forget()
+        self._step = max(math.ceil((now - self._first) / self._period - SLACK), self._step)
+        self._missed += int((now - self.stopped_at) / self._period)
+        self._after_pause = True
+        self._wake_step = self._step
+        self._lapse_step = max(self._lapse_step, self._step)
+        self._beat_step = max(self._beat_step, self._step)
+        if not lost:
+            self._listen(now)
+        self._schedule()
+        return lost
+
+    def _keep(self, link: AirLink) -> None:
+        for fault, count in link.effects.items():
+            self.effects[fault, link.sender] += count
+
+    def total_effects(self) -> list[Effect]:
+        """What faults did to what came here, over all lives."""
+        total = self.effects.copy()
+        for link in self.hears:
+            for fault, count in link.effects.items():
+                total[fault, link.sender] += count
+        return [Effect(fault=fault, sender=sender, count=count) for (fault, sender), count in total.items()]
+
+    def sense(self, trial: int, learning: str, views: Iterable[tuple[str, bool, bool]], now: float) -> None:
+        """The world says how tasks stand: (task, applicable, complete)."""
+        if not self.runs or trial < self.trial:
+            return
+        self._listen(now)
+        if trial > self.trial:
+            self.trial = trial
+            self.task = None
+            self._content = None
+            self._told.clear()
+            self.mind.handle(TrialStarted(translate.learning(learning)), now)
+            for link in self.hears:
+                link.forget()
+            self._wake(now)
+        for task, applicable, complete in views:
+            if task in self.heard_on:
+                self._feel(task, TaskSense(applicable, complete, 0.0), now)
+
+    def _feel(self, task: str, sense: TaskSense, now: float) -> None:
+        felt = sense.applicable, sense.complete
+        if self._told.get(task) != felt:
+            self._told[task] = felt
+            if self._sensed is not None:
+                self._sensed(now, self.name, task, *felt)
+            self.mind.handle(translate.sensed(task, *felt), now)
+            for link in self.hears:
+                link.forget()
+            self._wake(now)
+
+    def news(self, now: float) -> None:
+        """A message has come that may be news."""
+        if self.runs:
+            self._listen(now)
+
+    def _listen(self, now: float) -> None:
+        """Take in what has come until `now`."""
+        mind = self.mind
+        for link in self.hears:
+            if link.waiting:
+                for spoken in link.take(now, each=self._every_step):
+                    mind.handle(spoken.heard, spoken.arrives)
+        if mind.wake() < now:
+            self._wake(now)
+
+    def _instant(self, step: int) -> float:
+        return self._first + step * self._period
+
+    def _step_from(self, instant: float) -> int:
+        """The first control step that is not before `instant` and still to come."""
+        if instant == math.inf:
+            return NEVER
+        if instant <= self._instant(self._step):
+            return self._step
+        step = max(math.ceil((instant - self._first) / self._period - SLACK), self._step)
+        while self._instant(step) < instant:
+            step += 1
+        return step if self._instant(step - 1) < instant else step - 1
+
+    def _wake(self, now: float) -> None:
+        """Make a whole step as soon as possible."""
+        step = self._step_from(now)
+        if step < self._wake_step or self._wake_step < self._step:
+            self._wake_step = step
+            self._schedule()
+
+    def _schedule(self) -> None:
+        self._next = min(self._wake_step, self._lapse_step, self._beat_step)
+        due = self._first + self._next * self._period if self.runs else math.inf
+        if due != self.due:
+            self.due = due
+            self._rescheduled(self)
+
+    def step(self) -> None:
+        """Make the control step that is due."""
+        step, now, mind = self._next, self.due, self.mind
+        whole = step >= self._wake_step
+        if not whole and step >= self._lapse_step:
+            self._step = step
+            self._listen(now)
+            self._lapse_step = self._step_from(mind.next_lapse())
+            whole = step >= self._lapse_step or step >= self._wake_step
+        if whole or step >= self._beat_step:
+            if not self._after_pause:
+                mind.rest(self._instant(step - 1))
+            self._after_pause = False
+            self._step = step + 1
+            if whole:
+                self._listen(now)
+                self._think(now)
+            else:
+                self.beats += 1
+                self._perform(mind.beat(now), now)
+            if mind.broadcast_due != self._broadcast_due or self._beat_step <= step:
+                self._broadcast_due = mind.broadcast_due
+                self._beat_step = self._next_beat(step + 1)
+        self._schedule()
+
+    def _think(self, now: float) -> None:
+        self.steps += 1
+        self._perform(self.mind.tick(now), now)
+        if self._every_step:
+            self._wake_step = self._step
+            self._lapse_step = NEVER
+        else:
+            self._wake_step = self._step_from(self.mind.wake())
+            self._lapse_step = self._step_from(self.mind.next_lapse())
+
+    def _next_beat(self, step: int) -> int:
+        """The first step from `step` on at which an announcement is due, if all steps are made."""
+        before, is_due = self._instant(step - 1), self.mind.is_broadcast_due
+        while not is_due(now := self._instant(step), before):
+            before = now
+            step += 1
+        return step
+
+    def _perform(self, commands: list[Command], now: float) -> None:
+        for command in commands:
+            match command:
+                case Announce():
+                    self._announce(command, now)
+                case Activate():
+                    self.task = command.decision.task
+                    self._content = None
+                    self._decided(self, command.decision)
+                case Deactivate():
+                    self.task = None
+                    self._content = None
+                    self._decided(self, command.decision)
+
+    def _announce(self, said: Announce, now: float) -> None:
+        self.sent += 1
+        self._seq += 1
+        if self._content is None:
+            self._content = object()
+        heard = Heard(self.name, said.task, said.active_for, said.expected)
+        spoken = Spoken(now + self._delay, self.incarnation, self._seq, self.trial, self._content, heard)
+        for link in self.heard_idle if said.task is None else self.heard_on[said.task]:
+            link.send(spoken)
+
+
+#: The number of a control step that is never made.
+NEVER = 2**62

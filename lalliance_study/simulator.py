@@ -1,0 +1,436 @@
+"""A mission in virtual time: the very minds, world, environments and link rules of a real run, one heap of events, one thread.
+
+Any mission file runs, faults included. All delays of the real thing that matter are explicit (`Timing`), and all that is drawn
+comes from the mission's seed, so the same seed gives the same run to the last byte. What is left out is what a real run adds by
+accident: the scheduling of processes, the clocks of machines, the bus's own hiccups.
+"""
+
+import heapq
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from lalliance_agents.agent import translate
+from lalliance_agents.bus.base import LEASE
+from lalliance_agents.bus.link import LinkRules
+from lalliance_agents.config import Mission
+from lalliance_agents.model.events import Decision
+from lalliance_agents.wire.keys import WORLD
+from lalliance_agents.wire.messages import Action, DecisionMade, LinkReport
+from lalliance_study.air import AirLink
+from lalliance_study.member import Member, Process
+from world_server.environments.base import TaskView
+from world_server.failures import Deed, Order
+from world_server.world import REFRESH_PERIOD, STEP, Happening, Stage, World
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Delays of a real run, in seconds of mission time."""
+
+    message_delay: float = 0.001
+    """Of every message, before link rules."""
+    world_step: float = STEP
+    """Between two looks of the world server at its world."""
+    start_up: float = 0.4
+    """From the order to start a robot to its presence on the bus."""
+
+
+class Line(NamedTuple):
+    """One line of the event log."""
+
+    at: float
+    """Seconds since the simulation began."""
+    who: str
+    what: str
+    task: str | None
+    why: str
+    other: str | None
+
+    def __str__(self) -> str:
+        other = f" {self.other}" if self.other else ""
+        return f"{self.at:.6f} {self.who} {self.what}{f' {self.task}' if self.task else ''}: {self.why}{other}"
+
+
+Senses = tuple[int, str, list[tuple[str, bool, bool]]]
+"""What the world says of tasks: the trial, its way of learning, and of each task whether it is applicable, and complete."""
+
+
+class Watcher(Protocol):
+    """Whoever wants to know more of a run than its log tells."""
+
+    def sensed(self, at: float, robot: str, task: str, applicable: bool, complete: bool) -> None:
+        """A robot senses that a task stands otherwise than it knew."""
+
+    def decided(self, robot: str, decision: Decision) -> None:
+        """A robot has decided something, with all that is behind it."""
+
+
+class Simulator:
+    """Runs one mission.
+
+    Args:
+        mission: a mission that passed `environments.check_options`.
+        timing: the delays of a real run.
+        every_step: make every control step and take in every message, as a real run does, instead of only those in which
+            something may happen. The result is the same, and comes later.
+        watcher: told what robots sense and decide, as they do.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        *,
+        timing: Timing | None = None,
+        every_step: bool = False,
+        watcher: Watcher | None = None,
+    ) -> None:
+        self.mission = mission
+        self.now = 0.0
+        self.log: list[Line] = []
+        self._timing = timing or Timing()
+        self._watcher = watcher
+        self._heap: list[tuple[float, int, int, Callable[..., None], tuple[Any, ...]]] = []
+        self._serial = 0
+        self.world = World(mission, 0.0, self._tell)
+        self.members = {
+            name: Member(
+                mission,
+                name,
+                message_delay=self._timing.message_delay,
+                every_step=every_step,
+                decided=self._decided,
+                rescheduled=self._reschedule,
+                sensed=None if watcher is None else watcher.sensed,
+            )
+            for name in mission.robots
+        }
+        self._links = self._connect(every_step)
+        self._rules: LinkRules | None = None
+        self._look_at = math.inf
+        self._looked = -1
+        self._seen: dict[str, tuple[int, bool, bool]] = {}
+        self._late: set[str] = set()
+        self._blind: dict[str, tuple[str, float | None]] = {}
+        #: Of robots whose senses were held back: when what they know of each task was said.
+        self._tardy: dict[str, dict[str, float]] = {}
+        self._served: set[int] = set()
+        self._actions: dict[str, Action] = {}
+        self._reported: dict[str, int] = {}
+        self._seq = 0
+
+    def __repr__(self) -> str:
+        return f"<Simulator of {self.mission.name}: {self.world.stage}, {self.now:.3f} s>"
+
+    def _connect(self, every_step: bool) -> list[AirLink]:
+        links = []
+        for name, member in self.members.items():
+            for mate in self.mission.teammates(name):
+                hearer = self.members[mate]
+                link = AirLink(name, hearer, self._news_for(hearer), every_step=every_step)
+                links.append(link)
+                hearer.hears.append(link)
+                member.heard_idle.append(link)
+                for task in member.tasks:
+                    if task in hearer.heard_on:
+                        member.heard_on[task].append(link)
+        return links
+
+    def _news_for(self, hearer: Member) -> Callable[[float], None]:
+        def announce(at: float) -> None:
+            self._at(at, 0, self._bring_news, hearer)
+
+        return announce
+
+    def _bring_news(self, hearer: Member) -> None:
+        hearer.news(self.now)
+
+    def _at(self, instant: float, priority: int, deed: Callable[..., None], *arguments: Any) -> None:
+        self._serial += 1
+        heapq.heappush(self._heap, (instant, priority, self._serial, deed, arguments))
+
+    def _soon(self, deed: Callable[..., None], *arguments: Any) -> None:
+        """Have something done when a message sent now arrives."""
+        self._at(self.now + self._timing.message_delay, 0, deed, *arguments)
+
+    def run(self) -> dict[str, Any]:
+        """Run the mission to its end; its summary, as a real run gives it."""
+        for name, spec in self.mission.robots.items():
+            if spec.joins == 0.0:
+                self._at(0.0, 0, self._start, name)
+        self._soon(self._reach_launcher)
+        self._at(REFRESH_PERIOD, 0, self._refresh)
+        while not self.world.over:
+            self.now, _, _, deed, arguments = heapq.heappop(self._heap)
+            deed(*arguments)
+        self._report(final=True)
+        return self.world.summary()
+
+    def _tell(self, happening: Happening) -> None:
+        who = happening.robot or "world"
+        self.log.append(Line(self.now, who, happening.kind, happening.task, happening.text, None))
+
+    def _note(self, robot: str, why: str) -> None:
+        """Log what became of a robot's process."""
+        self.log.append(Line(self.now, robot, "process", None, why, None))
+
+    def _reach_launcher(self) -> None:
+        self.world.launcher(True, self.now)
+
+    # The robots' processes
+
+    def _start(self, name: str) -> None:
+        member = self.members[name]
+        if member.process is Process.GONE:
+            member.start(self.now)
+            self._actions.pop(name, None)  # what it said in an earlier life is no action of this one
+            self._note(name, "started")
+            self._soon(self._see, name, True)
+
+    def _see(self, name: str, present: bool) -> None:
+        """The world sees a process come or go."""
+        self.world.presence(name, present, self.now)
+        if present and self.world.trial and not self.world.over:
+            self._late.discard(name)
+            self._soon(self._sense, name, self._whole_view())
+        self._look()
+
+    def _lapse(self, name: str, incarnation: int, since: float) -> None:
+        """The bus gives up a process that has been stopped for longer than its lease."""
+        member = self.members[name]
+        if member.process is Process.STOPPED and (member.incarnation, member.stopped_at) == (incarnation, since):
+            member.given_up = True
+            self._see(name, False)
+
+    def _carry_out(self, order: Order) -> None:
+        """What the launcher does at a process."""
+        if order.number in self._served:
+            return
+        member = self.members[order.robot]
+        if order.deed in {Deed.KILL, Deed.HANG} and member.process is Process.GONE:
+            return  # it is still starting; the order stands, and meets it as soon as it is there
+        match order.deed:
+            case Deed.KILL:
+                self._note(order.robot, "killed")
+                member.kill(self.now)
+                self._soon(self._see, order.robot, False)
+            case Deed.START:
+                if member.process is not Process.GONE:
+                    return
+                self._at(self.now + self._timing.start_up, 0, self._start, order.robot)
+            case Deed.HANG:
+                if member.runs:
+                    self._note(order.robot, "stopped")
+                member.stop(self.now)
+                self._at(self.now + LEASE, 0, self._lapse, order.robot, member.incarnation, self.now)
+            case Deed.RESUME:
+                if member.process is Process.STOPPED:
+                    self._note(order.robot, "continued")
+                if member.resume(self.now):
+                    self._late.add(order.robot)
+                    self._soon(self._see_again, order.robot)
+        self._served.add(order.number)
+        self._soon(self._confirm, order.number)
+
+    def _see_again(self, name: str) -> None:
+        self.world.presence(name, True, self.now)
+        self._look()
+
+    def _confirm(self, number: int) -> None:
+        self.world.done(number, self.now)
+        self._look()
+
+    # The robots' minds
+
+    def _reschedule(self, member: Member) -> None:
+        if member.due < math.inf:
+            self._at(member.due, 1, self._step, member, member.due)
+
+    def _step(self, member: Member, due: float) -> None:
+        if member.due == due:
+            member.step()
+
+    def _decided(self, member: Member, decision: Decision) -> None:
+        self.log.append(
+            Line(self.now, member.name, decision.verb.value, decision.task, decision.cause.value, decision.other)
+        )
+        if self._watcher is not None:
+            self._watcher.decided(member.name, decision)
+        self._seq += 1
+        made = DecisionMade.model_construct(
+            sender=member.name,
+            incarnation=member.incarnation,
+            seq=self._seq,
+            at=self.now,
+            **translate.decision(decision, member.trial),
+        )
+        self._soon(self._act, member, self._action(member))
+        self._soon(self._hear_decision, made)
+
+    def _action(self, member: Member) -> Action:
+        self._seq += 1
+        action = Action.model_construct(
+            sender=member.name,
+            incarnation=member.incarnation,
+            seq=self._seq,
+            at=self.now,
+            task=member.task,
+            trial=member.trial,
+            fewest=member.mind.knowledge.fewest(member.abilities),
+        )
+        self._actions[member.name] = action
+        return action
+
+    def _act(self, member: Member, action: Action) -> None:
+        if member.process is not Process.GONE:
+            self.world.act(action, self.now)
+            self._look()
+
+    def _hear_decision(self, made: DecisionMade) -> None:
+        self.world.decided(made, self.now)
+
+    # The world
+
+    def _refresh(self) -> None:
+        """Once a second: bodies go on, counters are told, and who has missed something senses it."""
+        for member in self.members.values():
+            if member.runs:
+                before = self._actions.get(member.name)
+                if before is None or before.trial != member.trial or self.world.learning == "active":
+                    before = self._action(member)
+                self.world.act(before, self.now)
+        self._report(final=False)
+        for name in list(self._late):
+            if self.members[name].runs and name not in self._blind:
+                self._late.discard(name)
+                self._soon(self._sense, name, self._whole_view())
+        for name, (fault, _) in self._blind.items():
+            if self.members[name].runs:
+                self.members[name].effects[fault, WORLD] += len(self.members[name].tasks)
+        self._at(self.now + REFRESH_PERIOD, 0, self._refresh)
+        self._look()
+
+    def _report(self, *, final: bool) -> None:
+        """Tell the world what robots sent and received: all at the end, and meanwhile those to whom a fault did something."""
+        for member in self.members.values():
+            effects = member.total_effects()
+            touched = sum(effect.count for effect in effects)
+            if final or touched > self._reported.get(member.name, 0):
+                self._reported[member.name] = touched
+                self._seq += 1
+                self.world.reported(self._counters(member, effects, final=final), self.now)
+
+    def _counters(self, member: Member, effects: list[Any], *, final: bool) -> LinkReport:
+        dropped = Counter(
+            {
+                "stale": sum(link.stale for link in member.hears),
+                "other trial": sum(link.strange for link in member.hears),
+                "link fault": sum(link.lost for link in member.hears),
+            }
+        )
+        return LinkReport.model_construct(
+            sender=member.name,
+            incarnation=1,
+            seq=self._seq,
+            at=self.now,
+            sent=member.sent,
+            received=sum(link.received for link in member.hears),
+            dropped={reason: count for reason, count in dropped.items() if count},
+            teammates={},
+            effects=effects,
+            ticks=member.periods(self.now),
+            missed=0,
+            final=final,
+        )
+
+    def _look(self) -> None:
+        """Have the world server look at its world at its next step, as something has happened."""
+        self._look_by(self.now)
+
+    def _look_by(self, instant: float) -> None:
+        if instant == math.inf:
+            return
+        step = self._timing.world_step
+        number = max(math.ceil(instant / step - 1e-9), self._looked + 1)
+        if number * step < self._look_at:
+            self._look_at = number * step
+            self._at(self._look_at, 0, self._look_now, number)
+
+    def _look_now(self, number: int) -> None:
+        """One step of the world server: let time pass, and publish what has changed."""
+        if number <= self._looked:
+            return
+        self._looked = number
+        self._look_at = math.inf
+        world = self.world
+        if world.stage is Stage.WAITING and not world.missing():
+            world.begin(self.now)
+        world.advance(self.now)
+        for order in world.orders():
+            if order.number not in self._served:
+                self._soon(self._carry_out, order)
+        self._put_rules_in_force()
+        self._publish()
+        self._look_by(max(world.next_change(), self.now + self._timing.world_step / 2))
+
+    def _put_rules_in_force(self) -> None:
+        rules = self.world.rules()
+        if self._rules is None or self._rules.rules != tuple(rules):
+            self._rules = LinkRules(self.mission.seed, rules)
+            for link in self._links:
+                link.rule = self._rules.on(link.sender, link.hearer.name)
+        blind = {one.robot: (one.fault, one.delay) for one in self.world.blind()}
+        self._late |= self._blind.keys() - blind.keys()
+        self._blind = blind
+
+    def _publish(self) -> None:
+        if self.world.trial == 0 or self.world.over:
+            return
+        changed = [view for view in self._whole_view()[2] if self._is_new(view)]
+        if changed:
+            for name, member in self.members.items():
+                mine = [view for view in changed if view[0] in member.heard_on]
+                if mine:
+                    self._soon(self._sense, name, (self.world.trial, self.world.learning, mine))
+
+    def _is_new(self, view: tuple[str, bool, bool]) -> bool:
+        known = (self.world.trial, *view[1:])
+        if self._seen.get(view[0]) == known:
+            return False
+        self._seen[view[0]] = known
+        return True
+
+    def _whole_view(self) -> Senses:
+        views = [(task, *_applies(view)) for task, view in self.world.tasks().items()]
+        return self.world.trial, self.world.learning, views
+
+    def _sense(self, name: str, sensed: Senses, said_at: float | None = None) -> None:
+        """What the world says of tasks reaches a robot, unless it is blind; `said_at` is when, if it was held back."""
+        member = self.members[name]
+        if name in self._blind and said_at is None:
+            fault, delay = self._blind[name]
+            member.effects[fault, WORLD] += len(sensed[2])
+            if delay is None:
+                self._late.add(name)
+            else:
+                self._tardy.setdefault(name, {})
+                self._at(self.now + delay, 0, self._sense, name, sensed, self.now)
+            return
+        if member.process is Process.STOPPED:
+            self._late.add(name)
+        if name in self._tardy:
+            sensed = self._in_order(self._tardy[name], sensed, self.now if said_at is None else said_at)
+        member.sense(*sensed, self.now)
+
+    @staticmethod
+    def _in_order(known: dict[str, float], sensed: Senses, said_at: float) -> Senses:
+        """Without what has been overtaken: a robot drops what is older than what it knows."""
+        views = [view for view in sensed[2] if said_at >= known.get(view[0], 0.0)]
+        known.update((view[0], said_at) for view in views)
+        return sensed[0], sensed[1], views
+
+
+def _applies(view: TaskView) -> tuple[bool, bool]:
+    return view.applicable, view.complete
