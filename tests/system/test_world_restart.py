@@ -88,7 +88,7 @@ async def pid_of_new_world(processes: Processes, killed: set[int]) -> int:
         await asyncio.sleep(0.05)  # processes that begin give no sign that could be waited for
 
 
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(240)
 async def test_a_world_server_killed_at_fifty_random_instants_of_one_mission_changes_nothing(
     processes: Processes,
 ) -> None:
