@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from lalliance_agents.config import Mission
-from lalliance_agents.faults import LinkFault
+from lalliance_agents.faults import LinkFault, Slow, Stuck
 from lalliance_agents.model.parameters import SLACK
 from lalliance_study.evidence import Evidence, Span
 from world_server.world import REFRESH_PERIOD, STEP
@@ -79,15 +79,30 @@ def _worked_enough(evidence: Evidence, task: str, opened: float, at: float, by: 
     shares = []
     for span in evidence.history.spans:
         if span.task == task:
-            worked = min(span.until + delay, at) - max(span.since, opened)
-            if worked > 0:
-                shares.append((span.robot, worked / (mission.robots[span.robot].tasks[task] * least)))
+            worked = _worked(evidence, span, max(span.since, opened), min(span.until + delay, at))
+            shares.append((span.robot, worked / (mission.robots[span.robot].tasks[task] * least)))
     if options.get("hand_over") == "restart":
         done = min(max((share for robot, share in shares if robot == one), default=0.0) for one in by) if by else 1.0
     else:
         done = sum(share for _, share in shares)
     if done < 1 - ROUNDING:
         yield f"{task} is complete with {done:.1%} of its work done by {', '.join(by)}"
+
+
+def _worked(evidence: Evidence, span: Span, since: float, until: float) -> float:
+    """For how long at its full pace a robot can have worked in a span of time, in seconds."""
+    faults = [one for one in evidence.mission.faults if isinstance(one, Slow | Stuck) and one.robot == span.robot]
+    holding = [one for one in faults if isinstance(one, Slow) or one.task in {None, span.task}]
+    edges = [evidence.began + edge for one in holding for edge in (one.at, one.end) if evidence.live]
+    cuts = sorted({since, until, *(edge for edge in edges if since < edge < until)})
+    worked = 0.0
+    for start, end in pairwise(cuts if since < until else ()):
+        pace = 1.0
+        for one in holding:
+            if evidence.live and evidence.began + one.at <= start and end <= evidence.began + one.end:
+                pace = pace / one.factor if isinstance(one, Slow) else 0.0
+        worked += (end - start) * pace
+    return worked
 
 
 def attempts_are_real(evidence: Evidence) -> Iterator[str]:

@@ -56,8 +56,8 @@ class Result:
     promised: int = 0
     excused: Counter[str] = field(default_factory=Counter)
     """Missions that did not complete and need not have, by the reason."""
-    virtual: float = 0.0
-    """Seconds simulated."""
+    virtual: int = 0
+    """Microseconds simulated: whole ones, whose sum does not depend on the order."""
     scheduled: Counter[str] = field(default_factory=Counter)
     fired: Counter[str] = field(default_factory=Counter)
     """Faults by kind: those that missions had, and those that had an effect."""
@@ -71,9 +71,8 @@ class Result:
 
     def add(self, other: "Result") -> None:
         """Take in what came of other missions."""
-        for name in ("missions", "complete", "promised", "repeated", "stepped"):
+        for name in ("missions", "complete", "promised", "repeated", "stepped", "virtual"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
-        self.virtual += other.virtual
         for name in ("excused", "scheduled", "fired", "takeovers"):
             getattr(self, name).update(getattr(other, name))
         self.digest = (self.digest + other.digest) & _MASK
@@ -87,7 +86,7 @@ class Result:
             "complete": self.complete,
             "promised": self.promised,
             "excused": dict(sorted(self.excused.items())),
-            "virtual_hours": self.virtual / 3600,
+            "virtual_hours": self.virtual / 3.6e9,
             "faults": {kind: {"scheduled": self.scheduled[kind], "fired": self.fired[kind]} for kind in kinds},
             "takeovers": dict(sorted(self.takeovers.items())),
             "repeated": self.repeated,
@@ -174,7 +173,7 @@ def _count(result: Result, evidence: Evidence) -> None:
     result.promised += promised.seconds is not None
     if not complete and promised.seconds is None:
         result.excused[promised.why] += 1
-    result.virtual += evidence.ended
+    result.virtual += round(evidence.ended * 1e6)
     for fault, report in zip(evidence.mission.faults, evidence.summary["faults"], strict=True):
         kinds = kinds_of(fault)
         result.scheduled.update(kinds)

@@ -37,8 +37,10 @@ class Choice(NamedTuple):
     verb: str
     task: str
     cause: str
+    other: str | None
+    """The teammate that the decision speaks of."""
     silent_for: float
-    """How long ago the teammate that the decision speaks of was last heard on the task, in seconds; 0 if there is none."""
+    """How long ago that teammate was last heard on the task, in seconds; 0 if there is none."""
     ready: bool
     """Whether all factors of the set's motivation are 1."""
 
@@ -76,7 +78,8 @@ class Witness:
             * factors.acquiescence
             * factors.learned_robot_influence
         ) == 1
-        choice = Choice(decision.at, robot, decision.verb.value, decision.task, decision.cause.value, silent, ready)
+        verb, cause = decision.verb.value, decision.cause.value
+        choice = Choice(decision.at, robot, verb, decision.task, cause, other, silent, ready)
         self.notes.append(choice)
 
 

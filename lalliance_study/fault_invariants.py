@@ -24,10 +24,8 @@ from lalliance_agents.faults import (
     robot_of,
 )
 from lalliance_agents.model.parameters import Architecture, Erratum, Learning
-from lalliance_study.evidence import Evidence, Sight
-from lalliance_study.promises import longest_idleness
+from lalliance_study.evidence import Choice, Evidence, Sight
 from lalliance_study.simulator import Timing
-from world_server.rules import link_rules
 from world_server.world import REFRESH_PERIOD, STEP
 
 #: From the instant at which something is due in the world to its effect at a robot, in seconds: a step, and messages.
@@ -63,7 +61,7 @@ def is_taken_again(evidence: Evidence) -> Iterator[str]:
             continue
         for robot in mission.able(task):
             until = _taken_by(evidence, robot, at)
-            if robot != victim and until < evidence.ended and _is_free(evidence, robot, task, at, until):
+            if robot != victim and until < evidence.ended and is_free(evidence, robot, task, at, until):
                 if not _stays_away(evidence, victim, at, until):
                     continue
                 taken = [one for one in history.spans if one.task == task and one.since <= until and one.until > at]
@@ -77,18 +75,31 @@ def is_taken_again(evidence: Evidence) -> Iterator[str]:
 def _taken_by(evidence: Evidence, robot: str, at: float) -> float:
     """The instant by which `robot`, if it is free, takes what a teammate was on that fell silent at `at`."""
     own, period = evidence.mission.parameters_of(robot), evidence.mission.control_period
-    born = max([evidence.began, *(one for one in evidence.history.births.get(robot, ()) if one <= at)])
-    begun = max(at, born + own.silence_timeout + period)
-    noticed = max(at + evidence.message_delay + own.silence_timeout, begun) + period
+    silent = at + evidence.message_delay + own.silence_timeout + period
+    return max(silent, bored_by(evidence, robot, at)) + longest_delay(evidence.mission, robot) + 2 * period
+
+
+def bored_by(evidence: Evidence, robot: str, idle_since: float) -> float:
+    """The instant by which nothing but its patience keeps `robot` from a task, if it is idle from `idle_since` on."""
+    own, period = evidence.mission.parameters_of(robot), evidence.mission.control_period
+    births = evidence.history.births.get(robot, ())
+    born = max([evidence.began, *(one for one in births if one <= idle_since)])
+    begun = max(idle_since, born + own.silence_timeout + period) + period
     if own.architecture is Architecture.ALLIANCE:
-        return (
-            noticed + max(own.threshold / own.for_set(task).fast_rate for task in evidence.mission.tasks) + 2 * period
-        )
-    bored = begun + longest_idleness(own) - own.max_delay + period
-    return max(noticed, bored) + own.max_delay + 2 * period
+        return begun
+    return begun + own.boredom_threshold / own.effective_boredom_rate
 
 
-def _is_free(evidence: Evidence, robot: str, task: str, at: float, until: float) -> bool:
+def longest_delay(mission: Mission, robot: str) -> float:
+    """The longest time that motivation takes to grow to the threshold at the fast rate, in seconds."""
+    own = mission.parameters_of(robot)
+    if own.architecture is Architecture.ALLIANCE:
+        return max(own.threshold / own.for_set(task).fast_rate for task in mission.robots[robot].tasks)
+    return own.max_delay
+
+
+def is_free(evidence: Evidence, robot: str, task: str, at: float, until: float) -> bool:
+    """Whether `robot` is idle, senses `task` as open, hears all and runs, from one instant to another."""
     mission, history = evidence.mission, evidence.history
     own = mission.parameters_of(robot)
     literal = any(one is not Erratum.SECOND_PATIENCE and own.is_literal(one) for one in Erratum)
@@ -96,12 +107,12 @@ def _is_free(evidence: Evidence, robot: str, task: str, at: float, until: float)
         not literal
         and history.ran_throughout(robot, at, until)
         and history.idle_throughout(robot, at, until)
-        and not _disturbed(evidence, robot, until)
+        and not is_disturbed(evidence, robot, until)
         and _senses_open(evidence, robot, task, at, until)
     )
 
 
-def _disturbed(evidence: Evidence, robot: str, until: float) -> bool:
+def is_disturbed(evidence: Evidence, robot: str, until: float) -> bool:
     """Whether a fault may have kept `robot` from sensing or hearing before `until`, or delayed what it heard."""
     begun = evidence.began
     return any(
@@ -191,12 +202,25 @@ def _spared(evidence: Evidence, fault: Fault, since: float, until: float) -> flo
     """The chance that no message between robots that share a task is touched."""
     mission, chance = evidence.mission, 1.0
     touched = _least_chance(fault)
-    for rule in link_rules(fault, ""):
+    for senders, receivers in _pairs(fault):
         for sender in mission.robots:
-            mates = [mate for mate in mission.teammates(sender) if fits(mate, rule.receivers)]
-            if mates and fits(sender, rule.senders):
+            mates = [mate for mate in mission.teammates(sender) if fits(mate, receivers)]
+            if mates and fits(sender, senders):
                 chance *= (1 - touched) ** _least_messages(evidence, sender, mates, since, until)
     return chance
+
+
+def _pairs(fault: Fault) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """The globs of senders and receivers whose messages a fault touches."""
+    match fault:
+        case LinkFault() | Partition():
+            return list(fault.pairs())
+        case RadioFault(kind="mute"):
+            return [((fault.robot,), ("*",))]
+        case RadioFault():
+            return [(("*",), (fault.robot,))]
+        case _:
+            return []
 
 
 def _least_messages(evidence: Evidence, sender: str, mates: list[str], since: float, until: float) -> int:
@@ -232,6 +256,31 @@ def _least_chance(fault: Fault) -> float:
             1 - min(fault.loss.bad, fault.loss.good) - bad * max(fault.loss.bad - fault.loss.good, 0.0)
         )
     return 1 - spared * (1 - (fault.loss or 0.0))
+
+
+def what_is_cut_off_is_silent(evidence: Evidence) -> Iterator[str]:
+    """A robot last heard a teammate before the link between them was cut, as long as it is; told where nothing comes late."""
+    faults = evidence.mission.faults
+    if any(isinstance(one, LinkFault) and (one.delay is not None or one.reorder) for one in faults):
+        return
+    cuts = [
+        one for one in faults if isinstance(one, Partition | RadioFault) or (isinstance(one, LinkFault) and one.cut)
+    ]
+    for fault in cuts if evidence.live else ():
+        since, until = evidence.began + fault.at + LAG, evidence.began + fault.end
+        for choice in evidence.choices():
+            heard = choice.at - choice.silent_for
+            if choice.other is not None and since < heard <= choice.at <= until and _touches(fault, choice):
+                yield (
+                    f"{choice.at:.3f} {choice.robot} has heard {choice.other} on {choice.task} at {heard:.3f}, but since "
+                    f"{since - LAG:.3f} there is {describe(fault)}"
+                )
+
+
+def _touches(fault: Fault, choice: Choice) -> bool:
+    """Whether a fault touches what the robot of a choice hears of the other one."""
+    other = choice.other or ""
+    return any(fits(other, senders) and fits(choice.robot, receivers) for senders, receivers in _pairs(fault))
 
 
 def what_fired_was_there(evidence: Evidence) -> Iterator[str]:

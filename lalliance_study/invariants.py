@@ -7,12 +7,20 @@ all. Here stand those of tasks, robots and accounts; what concerns faults and si
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+from lalliance_agents.faults import Blind
 from lalliance_agents.model.events import Cause, Verb
 from lalliance_agents.model.parameters import SLACK
 from lalliance_study import fault_invariants
 from lalliance_study.accounts import attempts_are_real, credit_is_due, takeovers_are_real, totals_agree
 from lalliance_study.evidence import Choice, Evidence, Sight
+from lalliance_study.limit_invariants import (
+    attempts_are_limited,
+    collisions_are_settled,
+    contenders_make_yield,
+    patience_ends,
+)
 from lalliance_study.promises import promise, sound
+from world_server.world import REFRESH_PERIOD, STEP
 
 
 class Violation(NamedTuple):
@@ -89,6 +97,20 @@ def leaves_what_is_closed(evidence: Evidence) -> Iterator[str]:
         yield from _stayed(evidence, sight, evidence.ended)
 
 
+def causes_are_sensed(evidence: Evidence) -> Iterator[str]:
+    """A robot that ends a set as complete senses the task as complete, and one that drops it as inapplicable does not."""
+    felt: dict[tuple[str, str], Sight] = {}
+    for note in evidence.notes:
+        if isinstance(note, Sight):
+            felt[note.robot, note.task] = note
+        elif note.cause in {Cause.SENSED, Cause.INAPPLICABLE}:
+            sight = felt.get((note.robot, note.task))
+            expected = "complete" if note.cause == Cause.SENSED else "not applicable"
+            if sight is None or _state(sight) != expected:
+                state = "nothing of it" if sight is None else f"it as {_state(sight)}"
+                yield f"{note.at:.3f} {note.robot} ends {note.task} as {note.cause}, but senses {state}"
+
+
 def _stayed(evidence: Evidence, sight: Sight, until: float) -> Iterator[str]:
     after = sight.at + evidence.mission.control_period + SLACK
     if until > after and evidence.history.ran_throughout(sight.robot, sight.at, after):
@@ -105,6 +127,42 @@ def silence_is_long(evidence: Evidence) -> Iterator[str]:
                     f"{choice.at:.3f} {choice.robot} takes {choice.task} because of silence after {choice.silent_for:.3f} s, "
                     f"tau is {tau:g} s"
                 )
+
+
+def contenders_are_heard(evidence: Evidence) -> Iterator[str]:
+    """A task is yielded only to a teammate that was heard on it within tau."""
+    for choice in evidence.choices():
+        tau = evidence.mission.parameters_of(choice.robot).silence_timeout
+        if choice.verb == Verb.YIELD and choice.silent_for > tau + SLACK:
+            yield (
+                f"{choice.at:.3f} {choice.robot} yields {choice.task} to a teammate that it has not heard on it for "
+                f"{choice.silent_for:.3f} s, tau is {tau:g} s"
+            )
+
+
+def completions_are_sensed(evidence: Evidence) -> Iterator[str]:
+    """A robot whose process runs senses that a task is complete within a refresh of the world, and the delay of its senses.
+
+    Told of the last trial, and of robots whose senses are not held back for a time.
+    """
+    mission, began, history = evidence.mission, evidence.began, evidence.history
+    delays = {one.robot: one.delay for one in mission.faults if isinstance(one, Blind)}
+    sensed = {
+        (note.robot, note.task)
+        for note in evidence.notes
+        if isinstance(note, Sight) and note.at >= began and note.complete
+    }
+    for task, record in evidence.summary["tasks"].items():
+        if record["completed_at"] is None:
+            continue
+        for robot in mission.able(task):
+            delay = delays.get(robot, 0.0)
+            since = began + record["completed_at"]
+            if delay is None or (robot, task) in sensed:
+                continue
+            until = since + REFRESH_PERIOD + 2 * STEP + delay + 0.01
+            if until < evidence.ended and history.ran_throughout(robot, since, until):
+                yield f"{robot} has not sensed by {until:.3f} that {task} was completed at {since:.3f}"
 
 
 def time_goes_on(evidence: Evidence) -> Iterator[str]:
@@ -124,14 +182,22 @@ INVARIANTS: dict[str, Callable[[Evidence], Iterator[str]]] = {
         own_tasks_only,
         only_what_is_open,
         leaves_what_is_closed,
+        causes_are_sensed,
         silence_is_long,
+        contenders_are_heard,
+        completions_are_sensed,
         time_goes_on,
         credit_is_due,
         attempts_are_real,
         takeovers_are_real,
         totals_agree,
+        collisions_are_settled,
+        attempts_are_limited,
+        contenders_make_yield,
+        patience_ends,
         fault_invariants.is_taken_again,
         fault_invariants.faults_fire,
+        fault_invariants.what_is_cut_off_is_silent,
         fault_invariants.what_fired_was_there,
     )
 }

@@ -147,6 +147,7 @@ class Member:
     def stop(self, now: float) -> None:
         """Stop as by SIGSTOP."""
         if self.runs:
+            self._listen(now)  # what has come until now is heard, also if it was to be looked at later
             self.process = Process.STOPPED
             self.stopped_at = now
             self.given_up = False
@@ -171,7 +172,7 @@ class Member:
         self._lapse_step = max(self._lapse_step, self._step)
         self._beat_step = max(self._beat_step, self._step)
         if not lost:
-            self._listen(now)
+            self._listen(now, each=True)  # no news was looked at meanwhile: any of them may be some
         self._schedule()
         return lost
 
@@ -221,12 +222,12 @@ class Member:
         if self.runs:
             self._listen(now)
 
-    def _listen(self, now: float) -> None:
-        """Take in what has come until `now`."""
+    def _listen(self, now: float, *, each: bool = False) -> None:
+        """Take in what has come until `now`: of rows of refreshes the last, or `each`."""
         mind = self.mind
         for link in self.hears:
             if link.waiting:
-                for spoken in link.take(now, each=self._every_step):
+                for spoken in link.take(now, each=each or self._every_step):
                     mind.handle(spoken.heard, spoken.arrives)
         if mind.wake() < now:
             self._wake(now)

@@ -8,8 +8,8 @@ A mission is *promised* where
 - nobody who lives is stuck for good at what another can do; or else failures teach: L-ALLIANCE, an ordering in which a
   failed task is wanted less, delays that differ, no attempt that is too short to be told from a collision, no rule of links
   for good, by which teammates might not learn of it;
-- an attempt can be long enough where work starts from zero each time: the limits of attempts grow (L-ALLIANCE) or are long (by
-  hand);
+- an attempt can be long enough where work starts from zero each time: its limits are long (by hand), or grow with each failure
+  (L-ALLIANCE), which must not be too short either;
 - the Appendix is read as mended (the second patience may be read either way).
 
 Then each task is worked on again and again until it is done, and the bound is the sum, over all tasks, of the attempts that
@@ -132,6 +132,8 @@ def _restarts_in_vain(mission: Mission) -> str:
                     return "an attempt by hand is too short for its task"
             elif _growth(own) < LEAST_GROWTH:
                 return "attempts that start from zero hardly get longer"
+            elif _looks_like_a_collision(mission, robot):
+                return "attempts that start from zero look like collisions"
     return ""
 
 
@@ -164,10 +166,18 @@ def _fails_in_vain(mission: Mission, robot: str) -> str:
         return "stuck, and failing teaches too little"
     if own.max_delay < 2 * own.min_delay:
         return "stuck, and all tasks are wanted alike"
-    shortest = min(own.initial_task_time, *mission.robots[robot].tasks.values()) * min(own.give_up_factor, 1.0)
-    if shortest <= 1.1 * own.effective_collision_window:
+    if _looks_like_a_collision(mission, robot):
         return "stuck, and attempts look like collisions"
     return ""
+
+
+def _looks_like_a_collision(mission: Mission, robot: str) -> bool:
+    """Whether attempts may be so short that teammates take them for collisions, and learn nothing from them."""
+    own = mission.parameters_of(robot)
+    noise = float(mission.environment.options.get("noise", 0.0))
+    tasks = mission.robots[robot].tasks
+    times = [mission.robots[mate].tasks[task] * (1 - noise) for task in tasks for mate in mission.able(task)]
+    return min(own.initial_task_time, *times) * min(own.give_up_factor, 1.0) <= 1.1 * own.effective_collision_window
 
 
 def _need(mission: Mission, robot: str, task: str) -> float:
@@ -232,9 +242,5 @@ class _Effort:
         if own.architecture is Architecture.ALLIANCE:
             sets = [own.for_set(task) for task in self._mission.tasks]
             return own.silence_timeout + steps + max(one.patience + own.threshold / one.fast_rate for one in sets)
-        return own.silence_timeout + steps + longest_idleness(own) + max(own.initial_task_time, 2 * self._need)
-
-
-def longest_idleness(own: Parameters) -> float:
-    """How long a robot of L-ALLIANCE may be idle beside a task that nobody is on: boredom, then the delay; in seconds."""
-    return own.boredom_threshold / own.effective_boredom_rate + own.max_delay
+        idle = own.boredom_threshold / own.effective_boredom_rate + own.max_delay
+        return own.silence_timeout + steps + idle + max(own.initial_task_time, 2 * self._need)

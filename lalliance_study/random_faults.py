@@ -43,6 +43,16 @@ def draw_faults(chance: random.Random, robots: Document, horizon: float) -> list
     return documents
 
 
+def draw_stuck(chance: random.Random, robots: Document, horizon: float) -> list[Document]:
+    """Robots that are stuck for good at tasks which another one can do; they may be the only ones for other tasks."""
+    spared = _spared(chance, robots)
+    pairs = [(name, task) for name, spec in robots.items() for task in spec["tasks"] if spared[task] != name]
+    return [
+        {"at": round(chance.uniform(0.0, horizon), 3), "kind": "stuck", "robot": name, "task": task}
+        for name, task in chance.sample(pairs, min(len(pairs), chance.randint(1, 4)))
+    ]
+
+
 def _spared(chance: random.Random, robots: Document) -> dict[str, str]:
     """For each task the robot that will not be struck for good."""
     able: dict[str, list[str]] = {}

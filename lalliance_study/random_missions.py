@@ -20,7 +20,7 @@ import yaml
 from lalliance_agents.config import Mission
 from lalliance_agents.model.parameters import Erratum
 from lalliance_study.promises import promise, settled_after
-from lalliance_study.random_faults import draw_faults
+from lalliance_study.random_faults import draw_faults, draw_stuck
 from world_server import environments
 
 Document = dict[str, Any]
@@ -56,9 +56,13 @@ def draw_mission(seed: int, number: int) -> tuple[Document, Mission]:
     period = chance.choice((0.05, 0.1, 0.1, 0.2, 0.25))
     document["tasks"], document["robots"] = tasks, robots
     document["parameters"] = _parameters(chance, period, list(tasks))
-    _vary_robots(chance, robots, horizon, document["parameters"])
     document["phases"] = phases
-    document["faults"] = draw_faults(chance, robots, horizon)
+    if chance.random() < 0.06:
+        _let_failures_teach(chance, document["parameters"])
+        document["faults"] = draw_stuck(chance, robots, horizon)
+    else:
+        _vary_robots(chance, robots, horizon, document["parameters"])
+        document["faults"] = draw_faults(chance, robots, horizon)
     document["knowledge"] = chance.choice(("given", "given", "none"))
     document["control_period"] = period
     document["deadline"] = 1e6
@@ -200,8 +204,8 @@ def _parameters(chance: random.Random, period: float, tasks: list[str]) -> Docum
         found["boredom_threshold"] = between(chance, 0.5, 3.0)
         slowness = found["max_delay"] * chance.uniform(1.05, 3.0)
         found["boredom_rate"] = found["boredom_threshold"] / slowness
-    if chance.random() < 0.3:
-        found["collision_window"] = between(chance, 0.0, 1.0)
+    if chance.random() < 0.6:
+        found["collision_window"] = between(chance, 0.0, chance.choice((0.2, 0.2, 1.0)))
     found |= _factors(chance)
     if chance.random() < 0.08:
         found |= _by_hand(chance, tasks)
@@ -244,6 +248,17 @@ def _readings(chance: random.Random) -> Document:
         literal = [one for one in Erratum if one is not Erratum.STRATEGY_ONE]
         return {"readings": {one.value: "literal" for one in _some(chance, literal, 2)}}
     return {}
+
+
+def _let_failures_teach(chance: random.Random, parameters: Document) -> None:
+    """Make parameters such that robots which are stuck for good cannot keep a mission from completing (`promises`)."""
+    for name in ("architecture", "by_hand", "by_hand_tasks", "readings", "boredom_threshold", "boredom_rate"):
+        parameters.pop(name, None)
+    parameters["ordering"] = chance.choice(("derived", "modified_shortest_first"))
+    parameters["max_delay"] = round(parameters["min_delay"] * chance.uniform(2.1, 6.0) + 0.001, 3)
+    parameters["collision_window"] = between(chance, 0.0, 0.1)
+    parameters["failure_factor"] = between(chance, 2.0, 4.0)
+    parameters["give_up_factor"] = between(chance, 0.8, 3.0)
 
 
 def _vary_robots(chance: random.Random, robots: Document, horizon: float, parameters: Document) -> None:

@@ -266,7 +266,7 @@ class Simulator:
             at=self.now,
             **translate.decision(decision, member.trial),
         )
-        self._soon(self._act, member, self._action(member))
+        self._soon(self._act, self._action(member))
         self._soon(self._hear_decision, made)
 
     def _action(self, member: Member) -> Action:
@@ -283,10 +283,10 @@ class Simulator:
         self._actions[member.name] = action
         return action
 
-    def _act(self, member: Member, action: Action) -> None:
-        if member.process is not Process.GONE:
-            self.world.act(action, self.now)
-            self._look()
+    def _act(self, action: Action) -> None:
+        """An action reaches the world, also if its robot was killed meanwhile: the world sees that after it."""
+        self.world.act(action, self.now)
+        self._look()
 
     def _hear_decision(self, made: DecisionMade) -> None:
         self.world.decided(made, self.now)
@@ -303,7 +303,9 @@ class Simulator:
                 self.world.act(before, self.now)
         self._report(final=False)
         for name in list(self._late):
-            if self.members[name].runs and name not in self._blind:
+            # Senses that come late are refreshed all the same, and the refresh comes late.
+            held_back = name in self._blind and self._blind[name][1] is None
+            if self.members[name].runs and not held_back:
                 self._late.discard(name)
                 self._soon(self._sense, name, self._whole_view())
         for name, (fault, _) in self._blind.items():

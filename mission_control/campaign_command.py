@@ -59,7 +59,7 @@ def campaign(
 
         result, interrupted = examine(seed, [only]), False
     seconds = time.monotonic() - began
-    told = [] if interrupted else _tell_failures(seed, result.failures, out, console)
+    told = _tell_failures(seed, result.failures, out, console, make_smaller=not interrupted)
     document = {
         "seed": seed,
         "interrupted": interrupted,
@@ -109,17 +109,22 @@ def _check_writable(out: Path) -> None:
         raise UserError(f"{out}: missions that fail cannot be written there; expected a folder, or where to make one")
 
 
-def _tell_failures(seed: int, failures: "list[Failure]", out: Path, console: "Console") -> list[dict[str, Any]]:
+def _tell_failures(
+    seed: int, failures: "list[Failure]", out: Path, console: "Console", *, make_smaller: bool
+) -> list[dict[str, Any]]:
+    """Show each failure and write its mission; Ctrl-C ends the making small, not the writing."""
     from lalliance_study.campaign import make_small
     from lalliance_study.random_missions import draw_mission
 
     told = []
     for count, failure in enumerate(failures):
-        if count < MOST_MADE_SMALL:
-            _show_violations(f"seed {seed}, mission {failure.number}", failure.violations, console)
-            document = make_small(seed, failure)
-        else:
-            document, _ = draw_mission(seed, failure.number)
+        _show_violations(f"seed {seed}, mission {failure.number}", failure.violations, console)
+        document, _ = draw_mission(seed, failure.number)
+        if make_smaller and count < MOST_MADE_SMALL:
+            try:
+                document = make_small(seed, failure)
+            except KeyboardInterrupt:
+                make_smaller = False
         told += _tell(seed, failure, _write(seed, failure, document, out), console)
     return told
 

@@ -9,12 +9,14 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from lalliance_agents.errors import LallianceError
 from mission_control.processes import end_with_parent
 
 #: Parts that wait for each process.
@@ -30,6 +32,9 @@ def at_once(work: Callable[..., T], parts: Iterable[tuple[Any, ...]], jobs: int 
         work: a function of a module, called in another process.
         parts: its arguments, which can be pickled.
         jobs: the number of processes; None: one per core; 1: this one.
+
+    Raises:
+        LallianceError: one of the processes was killed.
     """
     jobs = len(os.sched_getaffinity(0)) if jobs is None else jobs
     return (work(*part) for part in parts) if jobs == 1 else _in_processes(work, iter(parts), jobs)
@@ -48,6 +53,8 @@ def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs
             done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for one in done:
                 yield one.result()
+    except BrokenProcessPool:
+        raise LallianceError("a process that did a part of the work was killed; is memory short?") from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         if waiting:

@@ -164,6 +164,70 @@ def test_a_silence_that_is_too_short() -> None:
     assert "because of silence after 0.900 s, tau is 1 s" in facts(evidence, "silence_is_long")
 
 
+def test_a_contender_that_is_not_heard() -> None:
+    def change(note: Sight | Choice) -> Sight | Choice:
+        return note._replace(verb="yield", silent_for=1.1) if isinstance(note, Choice) else note
+
+    told = facts(edit_notes(fresh("crash"), change), "contenders_are_heard")
+    assert "one yields a to a teammate that it has not heard on it for 1.100 s, tau is 1 s" in told
+
+
+def test_a_completion_that_is_not_sensed() -> None:
+    evidence = edit_notes(fresh("trials"), lambda note: None if isinstance(note, Sight) and note.complete else note)
+    assert "completions_are_sensed" not in broken(evidence)  # the trial ends before they must have
+    evidence = edit_notes(fresh("crash"), lambda note: None if isinstance(note, Sight) and note.complete else note)
+    assert "two has not sensed by" in facts(evidence, "completions_are_sensed")
+
+
+@pytest.mark.parametrize("cause", ["sensed", "inapplicable"])
+def test_a_set_that_ends_for_another_reason_than_is_sensed(cause: str) -> None:
+    def change(note: Sight | Choice) -> Sight | Choice:
+        return note._replace(complete=cause != "sensed") if isinstance(note, Sight) else note._replace(cause=cause)
+
+    assert f"as {cause}, but senses it as" in facts(edit_notes(fresh("trials"), change), "causes_are_sensed")
+    blind = edit_notes(fresh("trials"), lambda note: None if isinstance(note, Sight) else note)
+    assert "senses nothing of it" in facts(blind, "causes_are_sensed")
+
+
+@pytest.mark.parametrize(
+    "cut",
+    [
+        "{at: 0, partition: [one, two]}",
+        "{at: 0, robot: one, kind: mute}",
+        "{at: 0, robot: two, kind: deaf}",
+        "{at: 0, link: {from: one}, cut: true}",
+    ],
+)
+def test_a_robot_that_hears_what_is_cut_off(cut: str) -> None:
+    heard = fresh("crash")
+    mission = parse_mission(CRASH.replace("faults: [", f"faults: [{cut}, "), "cut")
+    assert "what_is_cut_off_is_silent" not in broken(gather(mission))
+    deaf = replace(heard, mission=mission)
+    deaf.summary["faults"].insert(0, gather(mission).summary["faults"][0])
+    assert "two has heard one on a at" in facts(deaf, "what_is_cut_off_is_silent")
+
+
+COLLISION = """
+name: collision
+tasks: {a: {}}
+robots: {one: {tasks: {a: 3}}, two: {tasks: {a: 3}}}
+parameters: {min_delay: 0.1, max_delay: 0.1}
+knowledge: given
+control_period: 0.01
+deadline: 300
+"""
+
+
+def test_a_collision_that_nobody_yields_to() -> None:
+    """Both begin within one message delay, which happens with some seeds only."""
+    missions = [parse_mission(f"{COLLISION}seed: {seed}\n", "collision") for seed in range(60)]
+    evidence = next(one for one in map(gather, missions) if any(line.why == "collision" for line in one.log))
+    assert judge(evidence) == []
+    assert [line.who for line in evidence.log if line.why == "collision"] == ["two"]
+    both = edit_log(evidence, lambda line: None if line.why == "collision" else line)
+    assert "two has not yielded by" in facts(both, "collisions_are_settled")
+
+
 def test_a_log_that_goes_back_in_time() -> None:
     evidence = fresh("crash")
     assert "is logged after" in facts(replace(evidence, log=evidence.log[::-1]), "time_goes_on")
@@ -253,6 +317,46 @@ def test_a_silent_robots_task_that_nobody_takes() -> None:
     evidence.summary["tasks"]["a"]["completed_at"] = None
     told = facts(evidence, "is_taken_again")
     assert told.startswith("one on a was killed at 2.051, and two, which is idle and can do it, has not taken it by 3.")
+
+
+LIMITS = """
+name: limits
+tasks: {a: {}, b: {arrives: 20}}
+robots: {one: {tasks: {a: 2, b: 2}}, two: {tasks: {a: 3}}}
+parameters: {min_delay: 0.1, max_delay: 0.3, ordering: modified_shortest_first}
+knowledge: given
+faults: [{at: 0, robot: one, kind: stuck, task: a, until: 12}, {at: 0, robot: two, kind: stuck, until: 11}]
+deadline: 300
+"""
+
+
+def test_limits_that_are_not_kept() -> None:
+    """One is stuck on a, two loses its patience after 3 s, one yields, takes a again, and so on."""
+    evidence = gather(parse_mission(LIMITS, "limits"))
+    assert judge(evidence) == []
+    told = [
+        f"{line.who} {line.what} {line.why}" for line in evidence.log if line.task == "a" and line.what != "takeover"
+    ]
+    assert told[:3] == ["one activate free", "two activate impatience", "one yield contender"]
+
+    patient = edit_log(evidence, lambda line: None if line.who == "two" and line.task == "a" else line)
+    stays = edit_log(
+        patient, lambda line: None if line.who == "one" and line.task == "a" and line.why != "free" else line
+    )
+    assert "two, which is idle and can do it, has not taken it by" in facts(stays, "patience_ends")
+    assert "one is on a since " in facts(stays, "attempts_are_limited")
+    both = edit_log(evidence, lambda line: line if line.what in {"activate", "process", "trial"} else None)
+    assert "but one has not yielded by" in facts(both, "contenders_make_yield")
+
+
+def test_work_at_a_pace_of_nothing_is_no_work() -> None:
+    """Two tasks that a slow and a stuck robot are said to have done in the time of a sound one."""
+    slow = fresh("rules")
+    slow.summary["tasks"]["a"]["completed_at"] = 9.0
+    assert "of its work done by one" in facts(slow, "credit_is_due")
+    evidence = gather(parse_mission(LIMITS, "limits"))
+    evidence.summary["tasks"]["a"].update(completed_at=9.0, by=["two"])
+    assert "a is complete with 0.0% of its work done" in facts(evidence, "credit_is_due")
 
 
 def test_a_busy_robot_need_not_take_it() -> None:

@@ -42,7 +42,7 @@ def test_a_mission_depends_on_seed_and_number_alone() -> None:
 def test_the_first_mission_of_all_is_known() -> None:
     """A failure is repeated by its number on any machine, so that what a number means must not change by accident."""
     document, _ = draw_mission(0, 0)
-    assert (len(document["tasks"]), len(document["robots"]), document["seed"]) == (1, 2, 2105982135)
+    assert (len(document["tasks"]), len(document["robots"]), document["seed"]) == (1, 2, 166555585)
 
 
 def test_sizes_are_mostly_small_and_reach_their_limits(missions: list[Mission]) -> None:
