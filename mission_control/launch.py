@@ -7,9 +7,10 @@ what happens, and leaves no process behind. It takes no part in the mission: rob
 import asyncio
 import contextlib
 import json
+import signal
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, Protocol
 
 from lalliance_agents.bus.base import Bus
 from lalliance_agents.bus.messenger import Messenger
@@ -20,7 +21,6 @@ from lalliance_agents.config import Mission
 from lalliance_agents.errors import BusError, LallianceError
 from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message
-from mission_control.live import Lines
 from mission_control.orders import Orders
 from mission_control.processes import GRACE, Child
 from mission_control.running import announced
@@ -74,6 +74,19 @@ class Plan:
         return ["world", str(self.path), "--json", *self.common(endpoint)]
 
 
+class View(Protocol):
+    """Where a launcher shows what happens."""
+
+    def take(self, message: Message, now: float) -> None:
+        """A message of the mission came at `now`."""
+
+    def locate(self, mission: str, endpoint: str) -> None:
+        """The mission's bus is there."""
+
+    def say(self, text: str) -> None:
+        """Something happened to a process."""
+
+
 class Launcher:
     """Runs one mission.
 
@@ -82,7 +95,7 @@ class Launcher:
         view: where to show what happens.
     """
 
-    def __init__(self, plan: Plan, view: Lines) -> None:
+    def __init__(self, plan: Plan, view: View) -> None:
         self._plan = plan
         self._view = view
         self._clock = MissionClock(plan.speed)
@@ -114,6 +127,14 @@ class Launcher:
                     return await self._conduct(bus)
         finally:
             await self._end_all()
+
+    def kill(self, what: Literal["router", "world"]) -> bool:
+        """Kill the router or the world server as an accident would (SIGKILL); whether there was one."""
+        child = self._router if what == "router" else self._world
+        if child is None or not child.running:
+            return False
+        child.send_signal(signal.SIGKILL)
+        return True
 
     async def _conduct(self, bus: Bus) -> dict[str, Any]:
         messenger = await self._watch(bus)

@@ -143,7 +143,12 @@ class WorldServer:
     def _tell(self, happening: Happening) -> None:
         _log.info("%7.1f s  %s", happening.elapsed, happening.text)
         self._send_event(
-            happening.kind, happening.text, happening.elapsed, robot=happening.robot, task=happening.task, details={}
+            happening.kind,
+            happening.text,
+            happening.elapsed,
+            robot=happening.robot,
+            task=happening.task,
+            details=dict(happening.details),
         )
 
     def _send_event(self, kind: str, text: str, elapsed: float, **fields: Any) -> None:
