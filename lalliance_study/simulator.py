@@ -189,6 +189,7 @@ class Simulator:
         member = self.members[name]
         if member.process is Process.GONE:
             member.start(self.now)
+            self._actions.pop(name, None)  # what it said in an earlier life is no action of this one
             self._soon(self._see, name, True)
 
     def _see(self, name: str, present: bool) -> None:

@@ -177,12 +177,12 @@ class RunningMission:
             ExpectationError: it ended otherwise, a fault has never fired, or its account cannot be true.
             LallianceError: it ended without a summary.
         """
+        self._judged = True
         if self._summary is None:
             self._summary = self._engine.conclude()
         summary = self._summary
         if summary["complete"] != complete:
             raise ExpectationError(f"mission {self.mission.name} {_outcome(summary, self.mission)}")
-        self._judged = True
         wrong = [*unfired(summary["faults"], self._excused), *broken(self.mission, summary)]
         if wrong:
             raise ExpectationError("; ".join(wrong))

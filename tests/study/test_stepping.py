@@ -64,8 +64,15 @@ def test_an_injected_crash_is_carried_out_and_its_healing_starts_the_robot_again
     assert told == ["left present: left is there", "left gone: left is gone", "left present: left is there"]
     assert [(one["robot"], one["ended"]) for one in summary["tasks"]["a"]["attempts"]] == [
         ("left", "lost"),
-        ("left", "sensed"),
+        ("left", None),
     ]
+
+
+def test_a_link_rule_touches_nothing_on_the_way_to_a_robot_that_is_not_there() -> None:
+    """Rules act where messages arrive; what is sent to a robot that was killed arrives nowhere."""
+    faults = "faults: [{at: 1, robot: left, kind: crash}, {at: 2, link: {from: right, to: left}, cut: true}]"
+    crash, cut = simulator(faults).run()["faults"]
+    assert (crash["fired"], cut["fired"], cut["count"]) == (True, False, 0)
 
 
 def test_a_fault_is_refused_once_the_mission_is_over() -> None:
