@@ -13,7 +13,6 @@ from enum import Enum
 from lalliance_agents.agent import translate
 from lalliance_agents.agent.behavior import TaskSense
 from lalliance_agents.agent.briefing import chance_of, new_mind, roster, tasks_of
-from lalliance_agents.bus.base import LEASE
 from lalliance_agents.config import Mission
 from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, Heard, TrialStarted
 from lalliance_agents.model.mind import Mind
@@ -33,6 +32,8 @@ class Process(Enum):
 #: What a member tells the simulator: a decision, and that its next step has changed.
 Decided = Callable[["Member", Decision], None]
 Rescheduled = Callable[["Member"], None]
+#: Told when, which robot senses of which task whether it is applicable, and complete.
+SensedHook = Callable[[float, str, str, bool, bool], None]
 
 
 class Member:
@@ -45,6 +46,7 @@ class Member:
         every_step: whether to make all control steps and to take in all messages.
         decided: called with each decision.
         rescheduled: called when `due` has changed.
+        sensed: called when a task is sensed to stand otherwise than before.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class Member:
         every_step: bool,
         decided: Decided,
         rescheduled: Rescheduled,
+        sensed: SensedHook | None = None,
     ) -> None:
         self.name = name
         self.tasks = tasks_of(mission, name)
@@ -80,10 +83,13 @@ class Member:
         self._every_step = every_step
         self._decided = decided
         self._rescheduled = rescheduled
+        self._sensed = sensed
         self._period = mission.control_period
         self._mind: Mind | None = None
         self.stopped_at = 0.0
         self._lived = self._missed = 0
+        #: Whether the bus has given it up since it was stopped.
+        self.given_up = False
         self._told: dict[str, tuple[bool, bool]] = {}
 
     def __repr__(self) -> str:
@@ -146,6 +152,7 @@ class Member:
         if self.runs:
             self.process = Process.STOPPED
             self.stopped_at = now
+            self.given_up = False
             # The steps before were made, if only in effect.
             self.mind.rest(self._instant(self._step_from(now) - 1))
             self._schedule()
@@ -155,7 +162,7 @@ class Member:
         if self.process is not Process.STOPPED:
             return False
         self.process = Process.RUNNING
-        lost = now - self.stopped_at > LEASE
+        lost = self.given_up
         for link in self.hears:
             if lost:
                 link.waiting.clear()
@@ -205,6 +212,8 @@ class Member:
         felt = sense.applicable, sense.complete
         if self._told.get(task) != felt:
             self._told[task] = felt
+            if self._sensed is not None:
+                self._sensed(now, self.name, task, *felt)
             self.mind.handle(translate.sensed(task, *felt), now)
             for link in self.hears:
                 link.forget()

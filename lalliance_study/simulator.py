@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from lalliance_agents.agent import translate
 from lalliance_agents.bus.base import LEASE
@@ -55,7 +55,22 @@ class Line(NamedTuple):
         return f"{self.at:.6f} {self.who} {self.what}{f' {self.task}' if self.task else ''}: {self.why}{other}"
 
 
+Senses = tuple[int, str, list[tuple[str, bool, bool]]]
+"""What the world says of tasks: the trial, its way of learning, and of each task whether it is applicable, and complete."""
+
+
+class Watcher(Protocol):
+    """Whoever wants to know more of a run than its log tells."""
+
+    def sensed(self, at: float, robot: str, task: str, applicable: bool, complete: bool) -> None:
+        """A robot senses that a task stands otherwise than it knew."""
+
+    def decided(self, robot: str, decision: Decision) -> None:
+        """A robot has decided something, with all that is behind it."""
+
+
 Follower = Callable[[Happening | DecisionMade], None]
+"""Whoever hears what an operator of a real run does."""
 
 
 class Simulator:
@@ -66,13 +81,22 @@ class Simulator:
         timing: the delays of a real run.
         every_step: make every control step and take in every message, as a real run does, instead of only those in which
             something may happen. The result is the same, and comes later.
+        watcher: told what robots sense and decide, as they do.
     """
 
-    def __init__(self, mission: Mission, *, timing: Timing | None = None, every_step: bool = False) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        *,
+        timing: Timing | None = None,
+        every_step: bool = False,
+        watcher: Watcher | None = None,
+    ) -> None:
         self.mission = mission
         self.now = 0.0
         self.log: list[Line] = []
         self._timing = timing or Timing()
+        self._watcher = watcher
         self._heap: list[tuple[float, int, int, Callable[..., None], tuple[Any, ...]]] = []
         self._serial = 0
         self.world = World(mission, 0.0, self._tell)
@@ -84,6 +108,7 @@ class Simulator:
                 every_step=every_step,
                 decided=self._decided,
                 rescheduled=self._reschedule,
+                sensed=None if watcher is None else watcher.sensed,
             )
             for name in mission.robots
         }
@@ -94,6 +119,8 @@ class Simulator:
         self._seen: dict[str, tuple[int, bool, bool]] = {}
         self._late: set[str] = set()
         self._blind: dict[str, tuple[str, float | None]] = {}
+        #: Of robots whose senses were held back: when what they know of each task was said.
+        self._tardy: dict[str, dict[str, float]] = {}
         self._served: set[int] = set()
         self._actions: dict[str, Action] = {}
         self._reported: dict[str, int] = {}
@@ -175,10 +202,15 @@ class Simulator:
         return done
 
     def _tell(self, happening: Happening) -> None:
-        who = happening.robot or "world"
+        # A robot tells nothing of faults, its own included.
+        who = "world" if happening.robot is None or happening.kind == "fault" else happening.robot
         self.log.append(Line(self.now, who, happening.kind, happening.task, happening.text, None))
         for told in self._followers:
             told(happening)
+
+    def _note(self, robot: str, why: str) -> None:
+        """Log what became of a robot's process."""
+        self.log.append(Line(self.now, robot, "process", None, why, None))
 
     def _reach_launcher(self) -> None:
         self.world.launcher(True, self.now)
@@ -190,6 +222,7 @@ class Simulator:
         if member.process is Process.GONE:
             member.start(self.now)
             self._actions.pop(name, None)  # what it said in an earlier life is no action of this one
+            self._note(name, "started")
             self._soon(self._see, name, True)
 
     def _see(self, name: str, present: bool) -> None:
@@ -204,6 +237,7 @@ class Simulator:
         """The bus gives up a process that has been stopped for longer than its lease."""
         member = self.members[name]
         if member.process is Process.STOPPED and (member.incarnation, member.stopped_at) == (incarnation, since):
+            member.given_up = True
             self._see(name, False)
 
     def _carry_out(self, order: Order) -> None:
@@ -211,8 +245,11 @@ class Simulator:
         if order.number in self._served:
             return
         member = self.members[order.robot]
+        if order.deed in {Deed.KILL, Deed.HANG} and member.process is Process.GONE:
+            return  # it is still starting; the order stands, and meets it as soon as it is there
         match order.deed:
             case Deed.KILL:
+                self._note(order.robot, "killed")
                 member.kill(self.now)
                 self._soon(self._see, order.robot, False)
             case Deed.START:
@@ -220,9 +257,13 @@ class Simulator:
                     return
                 self._at(self.now + self._timing.start_up, 0, self._start, order.robot)
             case Deed.HANG:
+                if member.runs:
+                    self._note(order.robot, "stopped")
                 member.stop(self.now)
                 self._at(self.now + LEASE, 0, self._lapse, order.robot, member.incarnation, self.now)
             case Deed.RESUME:
+                if member.process is Process.STOPPED:
+                    self._note(order.robot, "continued")
                 if member.resume(self.now):
                     self._late.add(order.robot)
                     self._soon(self._see_again, order.robot)
@@ -251,6 +292,8 @@ class Simulator:
         self.log.append(
             Line(self.now, member.name, decision.verb.value, decision.task, decision.cause.value, decision.other)
         )
+        if self._watcher is not None:
+            self._watcher.decided(member.name, decision)
         self._seq += 1
         made = DecisionMade.model_construct(
             sender=member.name,
@@ -397,24 +440,34 @@ class Simulator:
         self._seen[view[0]] = known
         return True
 
-    def _whole_view(self) -> tuple[int, str, list[tuple[str, bool, bool]]]:
+    def _whole_view(self) -> Senses:
         views = [(task, *_applies(view)) for task, view in self.world.tasks().items()]
         return self.world.trial, self.world.learning, views
 
-    def _sense(self, name: str, sensed: tuple[int, str, list[tuple[str, bool, bool]]], late: bool = False) -> None:
-        """What the world says of tasks reaches a robot, unless it is blind."""
+    def _sense(self, name: str, sensed: Senses, said_at: float | None = None) -> None:
+        """What the world says of tasks reaches a robot, unless it is blind; `said_at` is when, if it was held back."""
         member = self.members[name]
-        if name in self._blind and not late:
+        if name in self._blind and said_at is None:
             fault, delay = self._blind[name]
             member.effects[fault, WORLD] += len(sensed[2])
             if delay is None:
                 self._late.add(name)
             else:
-                self._at(self.now + delay, 0, self._sense, name, sensed, True)
+                self._tardy.setdefault(name, {})
+                self._at(self.now + delay, 0, self._sense, name, sensed, self.now)
             return
         if member.process is Process.STOPPED:
             self._late.add(name)
+        if name in self._tardy:
+            sensed = self._in_order(self._tardy[name], sensed, self.now if said_at is None else said_at)
         member.sense(*sensed, self.now)
+
+    @staticmethod
+    def _in_order(known: dict[str, float], sensed: Senses, said_at: float) -> Senses:
+        """Without what has been overtaken: a robot drops what is older than what it knows."""
+        views = [view for view in sensed[2] if said_at >= known.get(view[0], 0.0)]
+        known.update((view[0], said_at) for view in views)
+        return sensed[0], sensed[1], views
 
 
 def _applies(view: TaskView) -> tuple[bool, bool]:

@@ -58,5 +58,8 @@ class Engine(Protocol):
             LallianceError: it ended without one.
         """
 
+    def violations(self) -> list[str]:
+        """What did not hold in the mission that is over, as far as the engine can tell, a sentence for each."""
+
     def close(self) -> None:
         """Have nothing left that runs."""

@@ -1,7 +1,7 @@
 """What must hold of every mission that a test has run: its faults have fired, and its account is one that can be true.
 
-The account is judged with the mission alone, so the same sentences hold for real processes and for the simulator; what only
-the simulator can tell is judged by campaigns.
+The account is judged with the mission alone, so the same sentences hold for real processes and for the simulator. What only
+the simulator sees is held to the invariants of campaigns on top (`lalliance_study.invariants`).
 """
 
 from collections.abc import Collection, Iterator, Mapping

@@ -183,7 +183,11 @@ class RunningMission:
         summary = self._summary
         if summary["complete"] != complete:
             raise ExpectationError(f"mission {self.mission.name} {_outcome(summary, self.mission)}")
-        wrong = [*unfired(summary["faults"], self._excused), *broken(self.mission, summary)]
+        wrong = [
+            *unfired(summary["faults"], self._excused),
+            *broken(self.mission, summary),
+            *self._engine.violations(),
+        ]
         if wrong:
             raise ExpectationError("; ".join(wrong))
         return summary

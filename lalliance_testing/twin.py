@@ -9,6 +9,8 @@ from lalliance_agents.errors import UserError
 from lalliance_agents.faults import Fault
 from lalliance_agents.model.parameters import SLACK
 from lalliance_agents.wire.messages import DecisionMade
+from lalliance_study.evidence import Witness, collect
+from lalliance_study.invariants import judge
 from lalliance_study.simulator import Simulator
 from lalliance_testing.happenings import Happened, of_decision, of_event
 from world_server.world import Happening
@@ -23,7 +25,8 @@ class Twin:
 
     def __init__(self, mission: Mission) -> None:
         self.events: list[Happened] = []
-        self._simulator = Simulator(mission)
+        self._witness = Witness()
+        self._simulator = Simulator(mission, watcher=self._witness)
         self._simulator.follow(self._take)
 
     def __repr__(self) -> str:
@@ -77,6 +80,10 @@ class Twin:
         """Run to the end; the summary."""
         self.wait(lambda: False, None)
         return self._simulator.summary()
+
+    def violations(self) -> list[str]:
+        """The invariants of campaigns that did not hold."""
+        return [f"{one.invariant}: {one.facts}" for one in judge(collect(self._simulator, self._witness))]
 
     def close(self) -> None:
         """Nothing runs by itself."""

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 import typer
 
 from lalliance_agents.errors import LallianceError, UserError
+from mission_control.campaign_command import campaign
 from mission_control.chaos import chaos
 from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
 from mission_control.simulate import simulate
@@ -113,6 +114,7 @@ def run(
 
 
 app.command()(simulate)
+app.command()(campaign)
 
 
 @app.command()

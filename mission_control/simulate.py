@@ -68,7 +68,7 @@ def _often(mission: "Mission", runs: int, jobs: int | None, console: "Console") 
     with progress("runs", runs) as advance:
         for part in at_once(simulate_seeds, [(mission, part) for part in parts], jobs):
             found += part
-            advance(len(part))
+            advance(len(part), "")
     document = overview(mission, sorted(found))
     if not console.stderr:
         _show(document, mission, console)

@@ -207,9 +207,10 @@ class Failures:
         return [entry.name for entry in on], over
 
     def orders(self, elapsed: float) -> list[Order]:
-        """All orders that are due and not confirmed."""
+        """All orders that are due and not confirmed, in the order in which they became due (joins first)."""
         due = [entry.order for entry in self.entries if entry.order is not None]
-        return due + [order for robot, order in self._joining.items() if reaches(elapsed, self._joins[robot])]
+        due += [order for robot, order in self._joining.items() if reaches(elapsed, self._joins[robot])]
+        return sorted(due, key=lambda order: order.number)
 
     def done(self, number: int, elapsed: float) -> None:
         """Whoever holds the processes has carried out an order."""
@@ -277,6 +278,10 @@ class Failures:
         for effect in effects:
             if effect.count > 0 and effect.fault in by_name:
                 by_name[effect.fault].fire(elapsed, effect.count)
+
+    def faults(self) -> tuple[Fault, ...]:
+        """Each fault as it came to pass: also those that were injected, and until they were healed."""
+        return tuple(_timed(entry.fault, entry.begins, entry.ends) for entry in self.entries)
 
     def report(self) -> list[dict[str, Any]]:
         """Each fault, and whether and how often it fired."""

@@ -102,6 +102,11 @@ class World:
         return self._now - self._began if self.trial else 0.0
 
     @property
+    def began(self) -> float:
+        """When the trial began, as an instant of whoever hands in the time."""
+        return self._began
+
+    @property
     def learning(self) -> str:
         """The control phase of the trial."""
         return self._phase.learning.value

@@ -1,0 +1,64 @@
+"""`lalliance simulate`: what it prints, and what it refuses."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support.processes import MISSIONS, Processes
+
+HANDLING = MISSIONS / "material_handling.yaml"
+
+
+@pytest.fixture
+def processes(tmp_path: Path) -> Iterator[Processes]:
+    with Processes(tmp_path) as tree:
+        yield tree
+
+
+def test_one_run_gives_the_summary_of_a_real_one_and_its_events(processes: Processes) -> None:
+    document = processes.run_json("simulate", HANDLING, "--events")
+    assert document["complete"]
+    assert {"makespan", "tasks", "takeovers", "faults", "messages", "control", "seed"} <= document.keys()
+    assert [one["cause"] for one in document["takeovers"]] == ["silence", "impatience"]
+    assert [line["what"] for line in document["events"]].count("complete") == 16  # the task in the world, and its robot
+
+
+def test_many_runs_are_the_same_whatever_processes_they_run_in(processes: Processes) -> None:
+    alone = processes.run_json("simulate", HANDLING, "--runs", "20", "--jobs", "1")
+    together = processes.run_json("simulate", HANDLING, "--runs", "20", "--jobs", "2")
+    assert alone == together
+    assert alone["completed"] == 20
+    assert [run["seed"] for run in alone["runs"]] == list(range(7, 27))
+    assert alone["makespan"]["min"] < alone["makespan"]["median"] < alone["makespan"]["max"]
+    assert alone["faults"] == [20]
+    told = processes.run("simulate", HANDLING, "--runs", "20").stdout
+    assert "Mission material_handling complete in 20 of 20 runs, seeds 7 to 26" in told
+    assert "Fault: crash of lifter fired in 20 runs" in told
+
+
+def test_a_mission_that_does_not_complete_is_status_1(processes: Processes) -> None:
+    text = HANDLING.read_text().replace("deadline: 120", "deadline: 20")
+    (processes.folder / "short.yaml").write_text(text)
+    done = processes.run("simulate", "short.yaml", "--runs", "2", "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["makespan"] is None
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["no.yaml"], "lalliance: no.yaml: no such file\n"),
+        ([HANDLING, "--runs", "3", "--events"], "lalliance: --events shows one run; expected --runs 1, not 3\n"),
+    ],
+)
+def test_bad_input_is_told_in_one_sentence(processes: Processes, words: list[str], sentence: str) -> None:
+    done = processes.run("simulate", *words)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", sentence)
+
+
+@pytest.mark.parametrize("words", [["--runs", "0"], ["--seed", "-1"], ["--jobs", "0"], ["--runs", "many"]])
+def test_numbers_out_of_range_are_refused(processes: Processes, words: list[str]) -> None:
+    done = processes.run("simulate", HANDLING, *words)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert words[0] in done.stderr
