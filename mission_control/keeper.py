@@ -7,11 +7,10 @@ would come back for ever, while somebody who kills a server now and then only ho
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from lalliance_agents.errors import LallianceError, UserError
-from lalliance_agents.wire.messages import Status
-from mission_control.live import Lines
+from lalliance_agents.wire.messages import Message, Status
 from mission_control.processes import Child, OnLine
 
 #: How often a world server that dies is started again, while the mission does not get on.
@@ -20,6 +19,19 @@ RESTARTS = 20
 PROGRESS = 1.0
 #: Exit statuses with which a world server ends by itself: complete, not complete, bad input.
 _BY_ITSELF = frozenset({0, 1, 2})
+
+
+class View(Protocol):
+    """Where a launcher shows what happens."""
+
+    def take(self, message: Message, now: float) -> None:
+        """A message of the mission came at `now`."""
+
+    def locate(self, mission: str, endpoint: str) -> None:
+        """The mission's bus is there."""
+
+    def say(self, text: str) -> None:
+        """Something happened to a process."""
 
 
 class LaunchError(LallianceError):
@@ -36,21 +48,22 @@ class Keeper:
         on_line: called with each line that it writes to standard error.
     """
 
-    def __init__(self, arguments: Sequence[str], first: Sequence[str], view: Lines, on_line: OnLine) -> None:
+    def __init__(self, arguments: Sequence[str], first: Sequence[str], view: View, on_line: OnLine) -> None:
         self._arguments = [*arguments]
         self._first = [*first]
         self._view = view
         self._on_line = on_line
-        self._child: Child | None = None
+        #: Its process, if it was started.
+        self.child: Child | None = None
         self._deaths = 0
         self._furthest = (0, 0.0)
 
     def __repr__(self) -> str:
-        return f"<keeper of {self._child}, {self._deaths} deaths>"
+        return f"<keeper of {self.child}, {self._deaths} deaths>"
 
     async def start(self) -> None:
         """Start it for the first time."""
-        self._child = await self._start(self._first)
+        self.child = await self._start(self._first)
 
     async def _start(self, more: Sequence[str] = ()) -> Child:
         return await Child.start("world", [*self._arguments, *more], self._on_line, keeps_output=True)
@@ -69,17 +82,17 @@ class Keeper:
             UserError: it was given something that it cannot use.
             LaunchError: it ended without a summary, or died too often.
         """
-        while self._child is not None:
-            output = await self._child.read_all()
-            code = await self._child.wait()
+        while self.child is not None:
+            output = await self.child.read_all()
+            code = await self.child.wait()
             if code in _BY_ITSELF:
-                return self._read(self._child, output)
+                return self._read(self.child, output)
             self._deaths += 1
             if self._deaths > RESTARTS:
                 break
-            self._view.say(f"the world server ended ({self._child.status}); starting it again")
-            self._child = await self._start()
-        raise LaunchError(f"the world server ended {self._deaths} times without a summary ({_end_of(self._child)}")
+            self._view.say(f"the world server ended ({self.child.status}); starting it again")
+            self.child = await self._start()
+        raise LaunchError(f"the world server ended {self._deaths} times without a summary ({_end_of(self.child)}")
 
     def _read(self, child: Child, output: str) -> dict[str, Any]:
         """The last line of the world's output; what its environment may have printed stands before."""
@@ -93,8 +106,8 @@ class Keeper:
 
     async def end(self) -> None:
         """End it, if it runs."""
-        if self._child is not None:
-            await self._child.end()
+        if self.child is not None:
+            await self.child.end()
 
 
 def _end_of(child: Child | None) -> str:

@@ -7,9 +7,10 @@ another alone.
 
 import asyncio
 import contextlib
+import signal
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from lalliance_agents.bus.base import Bus
 from lalliance_agents.bus.messenger import Messenger
@@ -20,11 +21,11 @@ from lalliance_agents.config import Mission
 from lalliance_agents.errors import BusError
 from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message, Status
-from mission_control.keeper import Keeper, LaunchError
-from mission_control.live import Lines
+from mission_control.keeper import Keeper, LaunchError, View
 from mission_control.orders import Orders
 from mission_control.processes import GRACE, Child
 from mission_control.running import announced
+from world_server.history import recall
 from world_server.world import Stage, World
 
 #: How long the router may take to listen, in seconds.
@@ -96,6 +97,12 @@ class Plan:
     listen: str | None = None
     learned: Path | None = None
 
+    @classmethod
+    def kept_in(cls, folder: Path, path: Path, mission: Mission, **options: Any) -> "Plan":
+        """A plan whose world server's journal is new, in `folder`."""
+        journal = folder / "journal"
+        return cls(path.resolve(), mission, journal, Beginning.of(recall(journal, mission)), **options)
+
     def common(self, endpoint: str) -> list[str]:
         """Arguments of every process of the mission."""
         return ["--connect", endpoint, "--speed", repr(self.speed), "--seed", str(self.mission.seed)]
@@ -123,7 +130,7 @@ class Launcher:
         view: where to show what happens.
     """
 
-    def __init__(self, plan: Plan, view: Lines) -> None:
+    def __init__(self, plan: Plan, view: View) -> None:
         self._plan = plan
         self._view = view
         self._clock = MissionClock(plan.speed)
@@ -157,6 +164,14 @@ class Launcher:
                     return await self._conduct(bus)
         finally:
             await self._end_all()
+
+    def kill(self, what: Literal["router", "world"]) -> bool:
+        """Kill the router or the world server as an accident would (SIGKILL); whether there was one."""
+        child = self._router if what == "router" else self._world.child
+        if child is None or not child.running:
+            return False
+        child.send_signal(signal.SIGKILL)
+        return True
 
     async def _conduct(self, bus: Bus) -> dict[str, Any]:
         messenger = await self._watch(bus)

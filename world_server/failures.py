@@ -294,6 +294,10 @@ class Failures:
             if effect.count > 0 and effect.fault in by_name:
                 by_name[effect.fault].fire(elapsed, effect.count)
 
+    def faults(self) -> tuple[Fault, ...]:
+        """Each fault as it came to pass: also those that were injected, and until they were healed."""
+        return tuple(_timed(entry.fault, entry.begins, entry.ends) for entry in self.entries)
+
     def report(self) -> list[dict[str, Any]]:
         """Each fault, and whether and how often it fired."""
         return [entry.report() for entry in self.entries]

@@ -208,7 +208,10 @@ class WorldServer:
         untold, self._untold = self._untold, []
         for trial, one in untold:
             _log.info("%7.1f s  %s", one.elapsed, one.text)
-            self._send_event(one.kind, one.text, one.elapsed, trial=trial, robot=one.robot, task=one.task, details={})
+            details = dict(one.details)
+            self._send_event(
+                one.kind, one.text, one.elapsed, trial=trial, robot=one.robot, task=one.task, details=details
+            )
         if self._rules() != self._told_rules:
             self._publish_rules()
 

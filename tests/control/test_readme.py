@@ -29,7 +29,7 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
     (tmp_path / "missions").symlink_to(MISSIONS)
     [mission] = blocks("yaml")
     (tmp_path / "two-rooms.yaml").write_text(mission)
-    [code] = blocks("python")
+    [code] = [block for block in blocks("python") if "def behaviors" in block]
     (tmp_path / "my_robot.py").write_text(code)
     with Processes(tmp_path) as tree:
         yield tree
