@@ -33,6 +33,8 @@ class Hearer(Protocol):
     name: str
     tau: float
     trial: int
+    there: bool
+    """Whether it has a process, and with that somewhere for messages to arrive."""
 
 
 #: A silence is news a little before the hearer could notice it, in seconds.
@@ -82,6 +84,8 @@ class AirLink:
 
     def send(self, spoken: Spoken) -> None:
         """A message is on its way; `arrives` is when it would come if no rule touched it."""
+        if not self.hearer.there:
+            return
         if self.rule is None:
             self._put(spoken)
             return

@@ -234,17 +234,27 @@ def gather(mission: Mission, *, every_step: bool = False) -> Evidence:
         mission: a mission that passed `environments.check_options`.
         every_step: whether to make every control step.
     """
-    witness, timing = Witness(), Timing()
-    simulator = Simulator(mission, timing=timing, every_step=every_step, watcher=witness)
-    summary = simulator.run()
+    witness = Witness()
+    simulator = Simulator(mission, every_step=every_step, watcher=witness)
+    simulator.run()
+    return collect(simulator, witness)
+
+
+def collect(simulator: Simulator, witness: Witness) -> Evidence:
+    """The evidence of a mission that is over; its faults are those that came to pass, also by injection.
+
+    Args:
+        simulator: which has moved it, with the usual `Timing`.
+        witness: its watcher.
+    """
     world = simulator.world
     return Evidence(
-        mission=mission,
+        mission=simulator.mission.model_copy(update={"faults": world.failures.faults()}),
         log=simulator.log,
         notes=witness.notes,
-        summary=summary,
+        summary=world.summary(),
         began=world.began,
         ended=simulator.now,
         live=world.live,
-        message_delay=timing.message_delay,
+        message_delay=Timing().message_delay,
     )

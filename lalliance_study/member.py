@@ -63,6 +63,7 @@ class Member:
         self.name = name
         self.tasks = tasks_of(mission, name)
         self.process = Process.GONE
+        self.there = False
         self.incarnation = 0
         self.trial = 0
         self.tau = mission.parameters_of(name).silence_timeout
@@ -108,6 +109,7 @@ class Member:
     def start(self, now: float) -> None:
         """Begin a new life."""
         self.process = Process.RUNNING
+        self.there = True
         self.incarnation += 1
         chance = chance_of(self._mission, self.name, self.incarnation)
         self._mind = new_mind(self._mission, self.name, chance, now=now)
@@ -140,6 +142,7 @@ class Member:
         if self.runs:
             self._lived += self._periods_here(now)
         self.process = Process.GONE
+        self.there = False
         self.task = None
         self._mind = None
         self._schedule()

@@ -16,6 +16,7 @@ from lalliance_agents.agent import translate
 from lalliance_agents.bus.base import LEASE
 from lalliance_agents.bus.link import LinkRules
 from lalliance_agents.config import Mission
+from lalliance_agents.faults import Fault
 from lalliance_agents.model.events import Decision
 from lalliance_agents.wire.keys import WORLD
 from lalliance_agents.wire.messages import Action, DecisionMade, LinkReport
@@ -66,6 +67,10 @@ class Watcher(Protocol):
 
     def decided(self, robot: str, decision: Decision) -> None:
         """A robot has decided something, with all that is behind it."""
+
+
+Follower = Callable[[Happening | DecisionMade], None]
+"""Whoever hears what an operator of a real run does."""
 
 
 class Simulator:
@@ -120,6 +125,8 @@ class Simulator:
         self._actions: dict[str, Action] = {}
         self._reported: dict[str, int] = {}
         self._seq = 0
+        self._followers: list[Follower] = []
+        self._prepare()
 
     def __repr__(self) -> str:
         return f"<Simulator of {self.mission.name}: {self.world.stage}, {self.now:.3f} s>"
@@ -155,22 +162,51 @@ class Simulator:
         """Have something done when a message sent now arrives."""
         self._at(self.now + self._timing.message_delay, 0, deed, *arguments)
 
-    def run(self) -> dict[str, Any]:
-        """Run the mission to its end; its summary, as a real run gives it."""
+    def _prepare(self) -> None:
         for name, spec in self.mission.robots.items():
             if spec.joins == 0.0:
                 self._at(0.0, 0, self._start, name)
         self._soon(self._reach_launcher)
         self._at(REFRESH_PERIOD, 0, self._refresh)
+
+    def run(self) -> dict[str, Any]:
+        """Run the mission to its end; its summary, as a real run gives it."""
         while not self.world.over:
-            self.now, _, _, deed, arguments = heapq.heappop(self._heap)
-            deed(*arguments)
+            self.step()
+        return self.summary()
+
+    def step(self) -> None:
+        """Let the next thing happen, be it small; there is always one."""
+        self.now, _, _, deed, arguments = heapq.heappop(self._heap)
+        deed(*arguments)
+
+    def summary(self) -> dict[str, Any]:
+        """How the mission went, with the last counters of all robots."""
         self._report(final=True)
         return self.world.summary()
 
+    def follow(self, told: Follower) -> None:
+        """Have `told` called with what an operator of a real run hears: what happens in the world, and decisions."""
+        self._followers.append(told)
+
+    def inject(self, fault: Fault, lasts: float | None) -> str:
+        """Put a fault in force now; see `World.inject`."""
+        done = self.world.inject(fault, lasts, self.now)
+        self._look()
+        return done
+
+    def heal(self, name: str) -> str:
+        """End the fault `name` now, or all; see `World.heal`."""
+        done = self.world.heal(name, self.now)
+        self._look()
+        return done
+
     def _tell(self, happening: Happening) -> None:
-        who = happening.robot or "world"
+        # A robot tells nothing of faults, its own included.
+        who = "world" if happening.robot is None or happening.kind == "fault" else happening.robot
         self.log.append(Line(self.now, who, happening.kind, happening.task, happening.text, None))
+        for told in self._followers:
+            told(happening)
 
     def _note(self, robot: str, why: str) -> None:
         """Log what became of a robot's process."""
@@ -289,6 +325,8 @@ class Simulator:
         self._look()
 
     def _hear_decision(self, made: DecisionMade) -> None:
+        for told in self._followers:
+            told(made)
         self.world.decided(made, self.now)
 
     # The world

@@ -13,6 +13,8 @@ import logging
 import os
 import signal
 import sys
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
@@ -49,6 +51,10 @@ Parent = Annotated[int | None, typer.Option(hidden=True, help="End when the proc
 Learned = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Where robots keep what they learned; default: nowhere.")
 ]
+JournalPath = Annotated[
+    Path | None,
+    typer.Option("--journal", metavar="FILE", help="What happens is kept there; if it is there, the mission goes on."),
+]
 
 
 @app.callback(invoke_without_command=True)
@@ -76,14 +82,16 @@ def run(
         typer.Option(metavar="ENDPOINT", help="Where the router listens; default: a free port of this machine."),
     ] = None,
     learned: Learned = None,
+    journal: JournalPath = None,
     plain: Annotated[bool, typer.Option("--plain", help="One line per event instead of the live view.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a mission here: router, world and robots as processes."""
     from rich.console import Console
 
-    from mission_control.launch import Launcher, Plan
+    from mission_control.launch import Beginning, Launcher, Plan
     from mission_control.summary import show
+    from world_server.history import recall
 
     if connect is not None and listen is not None:
         raise UserError("--connect uses a router that runs already, --listen starts one; expected one of the two")
@@ -93,7 +101,6 @@ def run(
         from lalliance_agents.agent.catalog import prepare
 
         prepare(learned)
-    plan = Plan(path.resolve(), mission, speed, connect, listen, None if learned is None else learned.resolve())
     for warning in mission.warnings():
         _warn(f"{path}: {warning}")
     if (real := mission.parameters.silence_timeout / speed) < SHORTEST_SILENCE:
@@ -101,11 +108,17 @@ def run(
             f"--speed {speed:g} makes {real:.2g} real seconds of silence a failure; a busy machine may see some that are none"
         )
 
-    async def launch() -> dict[str, Any]:
-        with _view(mission, console, plain=plain) as view:
-            return await Launcher(plan, view).run()
+    def plan(kept: Path) -> Plan:
+        own = None if learned is None else learned.resolve()
+        beginning = Beginning.of(recall(kept, mission))
+        return Plan(path.resolve(), mission, kept.resolve(), beginning, speed, connect, listen, own)
 
-    summary = run_until_told(launch())
+    async def launch(kept: Path) -> dict[str, Any]:
+        with _view(mission, console, plain=plain) as view:
+            return await Launcher(plan(kept), view).run()
+
+    with _kept(journal) as kept:
+        summary = run_until_told(launch(kept))
     if as_json:
         typer.echo(json.dumps(summary))
     else:
@@ -145,6 +158,10 @@ def world(
     wait: Annotated[
         float, typer.Option(min=0.0, help="Seconds to wait for the whole team before beginning with a part of it.")
     ] = 30.0,
+    journal: JournalPath = None,
+    returning: Annotated[
+        float, typer.Option(min=0.0, help="Seconds to wait for robots that were there when the journal ends.")
+    ] = 2.0,
     as_json: AsJson = False,
     parent: Parent = None,
 ) -> None:
@@ -157,11 +174,21 @@ def world(
     async def serve() -> dict[str, Any]:
         from lalliance_agents.agent.catalog import fresh_incarnation
         from lalliance_agents.bus.zenoh_bus import open_bus
+        from world_server.journal import Journal
         from world_server.server import WorldServer
 
-        async with await open_bus(connect) as bus:
-            server = WorldServer(mission, bus=bus, incarnation=fresh_incarnation(), speed=speed, patience=wait)
-            return await server.run()
+        with contextlib.nullcontext() if journal is None else Journal(journal, mission) as kept:
+            async with await open_bus(connect) as bus:
+                server = WorldServer(
+                    mission,
+                    bus=bus,
+                    incarnation=fresh_incarnation(),
+                    speed=speed,
+                    patience=wait,
+                    journal=kept,
+                    returning=returning,
+                )
+                return await server.run()
 
     summary = run_until_told(serve())
     if as_json:
@@ -273,6 +300,22 @@ def _load(path: Path, seed: int | None, *, part: Literal["team", "world", "robot
 
         mission = load(path, for_team=part == "team")
     return mission if seed is None else mission.model_copy(update={"seed": seed})
+
+
+@contextlib.contextmanager
+def _kept(journal: Path | None) -> Iterator[Path]:
+    """The path of the world's journal: one of this run's own, which goes with it, if none is named."""
+    if journal is not None:
+        yield journal
+        return
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="lalliance-", ignore_cleanup_errors=True)
+    except OSError as error:
+        raise UserError(
+            f"no folder for temporary files ({error.strerror}); expected one that can be written to, or --journal FILE"
+        ) from error
+    with folder as name:
+        yield Path(name) / "journal"
 
 
 def _view(mission: "Mission", console: "Console", *, plain: bool) -> "Lines":

@@ -1,15 +1,16 @@
 """Run a mission on this machine: a router, a world server and one process per robot, and their end.
 
-The launcher starts the processes, has the world's orders carried out at them, starts its router again if that dies, shows
-what happens, and leaves no process behind. It takes no part in the mission: robots and world talk to one another alone.
+The launcher starts the processes, has the world's orders carried out at them, starts its router and its world server again if
+they die, shows what happens, and leaves no process behind. It takes no part in the mission: robots and world talk to one
+another alone.
 """
 
 import asyncio
 import contextlib
-import json
-from dataclasses import dataclass
+import signal
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from lalliance_agents.bus.base import Bus
 from lalliance_agents.bus.messenger import Messenger
@@ -17,13 +18,15 @@ from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
-from lalliance_agents.errors import BusError, LallianceError
+from lalliance_agents.errors import BusError
 from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
-from lalliance_agents.wire.messages import Event, Message
-from mission_control.live import Lines
+from lalliance_agents.wire.messages import Event, Message, Status
+from mission_control.keeper import Keeper, LaunchError, View
 from mission_control.orders import Orders
 from mission_control.processes import GRACE, Child
 from mission_control.running import announced
+from world_server.history import recall
+from world_server.world import Stage, World
 
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
@@ -33,10 +36,41 @@ LAST_CHANCE = 5.0
 ROUTER_GRACE = 0.3
 #: How often a router that dies is started again.
 ROUTER_RESTARTS = 20
+#: How long the world server of a mission that goes on waits for the robots that are started with it, in real seconds.
+RETURN_PATIENCE = 30.0
 
 
-class LaunchError(LallianceError):
-    """A mission that could not be brought to its end."""
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """Where a mission begins that may have come some way before.
+
+    Attributes:
+        first: the robots to start at once.
+        lost: those that a fault has killed.
+        may_return: those of them that may be started again: by the mission, or when an operator heals what they died of.
+        lives: the latest incarnation of each robot that was there before.
+        goes_on: whether the mission has begun already.
+    """
+
+    first: tuple[str, ...]
+    lost: frozenset[str] = frozenset()
+    may_return: frozenset[str] = frozenset()
+    lives: dict[str, int] = field(default_factory=dict)
+    goes_on: bool = False
+
+    @classmethod
+    def of(cls, world: World) -> "Beginning":
+        """Where a mission is whose world stands as `world` does; one that is over needs no robot."""
+        failures = world.failures
+        killed, joining = failures.killed(), failures.joining()
+        first = [] if world.over else [robot for robot in world.bodies if robot not in killed | joining]
+        return cls(
+            first=tuple(first),
+            lost=frozenset(killed),
+            may_return=frozenset(killed - failures.killed_for_good()),
+            lives=world.ledger.lives(),
+            goes_on=world.stage is not Stage.WAITING,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +80,8 @@ class Plan:
     Attributes:
         path: the mission file, handed to every process.
         mission: what it says.
+        journal: the world server's journal.
+        beginning: where the mission is.
         speed: mission seconds per real second.
         connect: the endpoint of a router that runs already; None: start one.
         listen: where a router of our own listens; None: a free port on this machine.
@@ -54,10 +90,18 @@ class Plan:
 
     path: Path
     mission: Mission
+    journal: Path
+    beginning: Beginning
     speed: float = 1.0
     connect: str | None = None
     listen: str | None = None
     learned: Path | None = None
+
+    @classmethod
+    def kept_in(cls, folder: Path, path: Path, mission: Mission, **options: Any) -> "Plan":
+        """A plan whose world server's journal is new, in `folder`."""
+        journal = folder / "journal"
+        return cls(path.resolve(), mission, journal, Beginning.of(recall(journal, mission)), **options)
 
     def common(self, endpoint: str) -> list[str]:
         """Arguments of every process of the mission."""
@@ -71,7 +115,11 @@ class Plan:
 
     def world(self, endpoint: str) -> list[str]:
         """Arguments of the world server's process."""
-        return ["world", str(self.path), "--json", *self.common(endpoint)]
+        return ["world", str(self.path), "--json", "--journal", str(self.journal), *self.common(endpoint)]
+
+    def first_world(self) -> list[str]:
+        """Further arguments of the world server's first process."""
+        return ["--returning", repr(RETURN_PATIENCE)] if self.beginning.goes_on else []
 
 
 class Launcher:
@@ -82,18 +130,19 @@ class Launcher:
         view: where to show what happens.
     """
 
-    def __init__(self, plan: Plan, view: Lines) -> None:
+    def __init__(self, plan: Plan, view: View) -> None:
         self._plan = plan
         self._view = view
         self._clock = MissionClock(plan.speed)
         asked = plan.listen if plan.connect is None else plan.connect
         self._endpoint = free_endpoint() if asked is None else asked
         self._router: Child | None = None
-        self._world: Child | None = None
         self._robots: dict[str, Child] = {}
-        self._lives: dict[str, int] = {}
+        self._lives = dict(plan.beginning.lives)
+        self._world = Keeper(plan.world(self._endpoint), plan.first_world(), view, self._on_line)
         self._messenger: Messenger | None = None
         self._orders = Orders(plan.mission, self._robots, self._restart, self._report)
+        self._orders.may_return |= plan.beginning.may_return
         self._tasks: set[asyncio.Task[None]] = set()
         self._robot_ended = asyncio.Event()
 
@@ -103,6 +152,7 @@ class Launcher:
         Raises:
             BusError: no router could be started or reached.
             LaunchError: the mission could not be brought to its end.
+            UserError: the world server was given something that it cannot use.
         """
         try:
             if self._plan.connect is None:
@@ -115,14 +165,19 @@ class Launcher:
         finally:
             await self._end_all()
 
+    def kill(self, what: Literal["router", "world"]) -> bool:
+        """Kill the router or the world server as an accident would (SIGKILL); whether there was one."""
+        child = self._router if what == "router" else self._world.child
+        if child is None or not child.running:
+            return False
+        child.send_signal(signal.SIGKILL)
+        return True
+
     async def _conduct(self, bus: Bus) -> dict[str, Any]:
         messenger = await self._watch(bus)
-        world = self._world = await Child.start(
-            "world", self._plan.world(self._endpoint), self._on_line, keeps_output=True
-        )
-        first = [name for name, spec in self._plan.mission.robots.items() if spec.joins == 0]
-        await asyncio.gather(*(self._start_robot(name) for name in first))
-        summary = await self._await_end(world)
+        await self._world.start()
+        await asyncio.gather(*(self._start_robot(name) for name in self._plan.beginning.first))
+        summary = await self._await_end()
         await self._await_robots()
         await messenger.close()
         return summary
@@ -140,6 +195,8 @@ class Launcher:
             return
         if isinstance(message, Event) and message.kind == "order":
             self._orders.take(message)
+        elif isinstance(message, Status):
+            self._world.heard(message)
         self._view.take(message, self._clock.now())
 
     def _restart(self, robot: str) -> None:
@@ -195,9 +252,9 @@ class Launcher:
             child = self._router = await Child.start("router", arguments, self._on_line, keeps_output=True)
             await child.read_line()
 
-    async def _await_end(self, world: Child) -> dict[str, Any]:
+    async def _await_end(self) -> dict[str, Any]:
         """The summary of the world server, or an error as soon as nobody is left to complete the mission."""
-        ending = asyncio.create_task(world.read_all())
+        ending = asyncio.create_task(self._world.summary())
         deserted = asyncio.create_task(self._await_desertion())
         try:
             while not ending.done():
@@ -209,7 +266,7 @@ class Launcher:
                     raise LaunchError(f"no robot is left to complete the mission ({ends})")
                 if deserted.done():  # and a robot has come back since
                     deserted = asyncio.create_task(self._await_desertion())
-            return await self._read_summary(world, ending.result())
+            return ending.result()
         finally:
             ending.cancel()
             deserted.cancel()
@@ -221,17 +278,8 @@ class Launcher:
 
     def _is_deserted(self) -> bool:
         """Whether every robot has been there, has ended, and will not return; one that is stopped is still there."""
-        all_came = self._robots.keys() == self._plan.mission.robots.keys()
+        all_came = self._robots.keys() | self._plan.beginning.lost == self._plan.mission.robots.keys()
         return all_came and not self._orders.may_return and not any(child.running for child in self._robots.values())
-
-    async def _read_summary(self, world: Child, output: str) -> dict[str, Any]:
-        """The last line of the world's output; what its environment may have printed stands before."""
-        await world.wait()
-        try:
-            summary: dict[str, Any] = json.loads(output.splitlines()[-1])
-        except (ValueError, IndexError):
-            raise LaunchError(f"the world server ended without a summary ({world.status}): {world.last_line}") from None
-        return summary
 
     async def _await_robots(self) -> None:
         """Robots end by themselves when the mission is over, but for those that are stopped."""
@@ -243,7 +291,6 @@ class Launcher:
     async def _end_all(self) -> None:
         for task in list(self._tasks):
             task.cancel()
-        children = [*self._robots.values(), *([self._world] if self._world else [])]
-        await asyncio.gather(*(child.end() for child in children))
+        await asyncio.gather(self._world.end(), *(child.end() for child in self._robots.values()))
         if self._router is not None:
             await self._router.end(grace=ROUTER_GRACE)

@@ -10,10 +10,9 @@ from typing import Any
 from lalliance_agents.bus.base import Sample
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.errors import MessageError, UserError
-from lalliance_agents.mission_file import read_fault
 from lalliance_agents.wire.keys import OPERATOR
 from lalliance_agents.wire.messages import LONGEST_LINE, ChaosAnswer, ChaosCommand, decode, encode
-from world_server.world import World
+from world_server.history import History
 
 #: Faults that one mission can have had in all: an operator's script that runs wild ends here.
 MOST_FAULTS = 1000
@@ -25,19 +24,20 @@ class ChaosDesk:
     """Answers commands.
 
     Args:
-        world: the world they are about.
+        history: of the world they are about.
         messenger: gives the answers their header.
         clock: the present instant, in seconds of mission time.
-        changed: called after each command that may have put a fault in force or ended one.
+        settle: called before each answer; makes what was done last, and tells others of it.
     """
 
     def __init__(
-        self, world: World, messenger: Messenger, clock: Callable[[], float], changed: Callable[[], None]
+        self, history: History, messenger: Messenger, clock: Callable[[], float], settle: Callable[[], None]
     ) -> None:
-        self._world = world
+        self._history = history
+        self._world = history.world
         self._messenger = messenger
         self._clock = clock
-        self._changed = changed
+        self._settle = settle
 
     def answer(self, ask: Sample) -> list[Sample]:
         """The answer to one command."""
@@ -52,19 +52,15 @@ class ChaosDesk:
 
     def _carry_out(self, command: ChaosCommand) -> str:
         now = self._clock()
-        self._world.advance(now)
         if command.verb == "status":
+            self._history.advance(now)
             return f"{self._world.stage} at {self._world.elapsed:.1f} s"
-        if command.verb == "heal":
-            text = self._world.heal(command.name, now)
-        elif len(self._world.failures.entries) >= MOST_FAULTS:
+        if command.verb == "inject" and len(self._world.failures.entries) >= MOST_FAULTS:
             raise UserError(f"this mission has had {MOST_FAULTS} faults; expected no more than that")
-        else:
-            text = self._world.inject(read_fault(command.fault), command.lasts, now)
-        self._changed()
-        return text
+        return self._history.obey(command, now)
 
     def _reply(self, ask: Sample, *, done: bool, text: str) -> list[Sample]:
+        self._settle()
         faults: list[dict[str, Any]] = self._world.failures.report()
         answer = ChaosAnswer(
             **self._messenger.header(), done=done, text=text[:LONGEST_LINE], faults=faults[-SHOWN_FAULTS:]

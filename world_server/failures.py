@@ -232,6 +232,21 @@ class Failures:
                     entry.fire(elapsed)
                 entry.order = None
 
+    def killed(self) -> set[str]:
+        """The robots that a fault in force has killed."""
+        return {robot_of(one.fault) or "" for one in self._on() if isinstance(one.fault, Crash) and not one.must_die}
+
+    def killed_for_good(self) -> set[str]:
+        """The robots that the mission itself has killed, which does not mean to start them again."""
+        scheduled = [one for one in self.entries[: len(self._mission.faults)] if one.state is State.ON]
+        return self.killed() & {
+            robot_of(one.fault) or "" for one in scheduled if isinstance(one.fault, Crash) and one.ends == math.inf
+        }
+
+    def joining(self) -> set[str]:
+        """The robots that are to join the live trial and have not come yet."""
+        return set(self._joining)
+
     @property
     def hold_up(self) -> bool:
         """Whether any body may be held up just now."""
@@ -278,6 +293,10 @@ class Failures:
         for effect in effects:
             if effect.count > 0 and effect.fault in by_name:
                 by_name[effect.fault].fire(elapsed, effect.count)
+
+    def faults(self) -> tuple[Fault, ...]:
+        """Each fault as it came to pass: also those that were injected, and until they were healed."""
+        return tuple(_timed(entry.fault, entry.begins, entry.ends) for entry in self.entries)
 
     def report(self) -> list[dict[str, Any]]:
         """Each fault, and whether and how often it fired."""

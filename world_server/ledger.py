@@ -146,6 +146,10 @@ class Ledger:
         self._links[report.sender] = report
         return before
 
+    def lives(self) -> dict[str, int]:
+        """The latest incarnation of each robot that has reported its counters."""
+        return {robot: report.incarnation for robot, report in self._links.items()}
+
     def has_final(self, robot: str) -> bool:
         """Whether the latest life of `robot` has reported its counters for the last time."""
         return robot in self._links and self._links[robot].final

@@ -3,9 +3,13 @@
 It hears the robots' actions, decisions and counters and sees their presence, lets the world advance a few times a second, and
 publishes what changed: task states as sensory feedback, each body's state, events, and how the mission stands. What robots
 need to know is refreshed once a second and answered on query, so that a late or reconnected robot is not at a loss.
+
+With a journal, a server that was killed at any instant is followed by one that goes on where it ended: mission time stood
+still meanwhile. Nothing is told, to robots or to operators, before the journal holds what it follows from.
 """
 
 import asyncio
+import contextlib
 import logging
 from typing import Any
 
@@ -20,7 +24,9 @@ from lalliance_agents.wire.messages import LONGEST_LINE, Action, DecisionMade, D
 from world_server.chaos import ChaosDesk
 from world_server.environments.base import TaskView
 from world_server.failures import Order
-from world_server.world import REFRESH_PERIOD, STEP, Happening, World
+from world_server.history import History
+from world_server.journal import Journal
+from world_server.world import REFRESH_PERIOD, STEP, Happening
 
 _log = logging.getLogger(__name__)
 
@@ -29,6 +35,8 @@ LEAST_STEP = 0.01
 #: How long to listen at the start for another world server of the mission, in real seconds.
 RIVAL_TIMEOUT = 0.5
 STATUS_PERIOD = 0.25
+#: How long a server that goes on where another ended waits for the robots that were there then, in real seconds.
+RETURN_TIMEOUT = 2.0
 #: How long the world stays at the end for the robots' last reports, in real seconds.
 LINGER = 2.0
 
@@ -42,20 +50,42 @@ class WorldServer:
         incarnation: larger than that of any world server before it in this mission.
         speed: mission seconds per real second.
         patience: how long to wait for the whole team before beginning with a part of it, in real seconds.
+        journal: where the mission is to be found again; None: nowhere. The server does not close it.
+        returning: how long to wait for the robots that were there according to the journal, in real seconds.
+
+    Raises:
+        UserError: the journal is damaged.
     """
 
     def __init__(
-        self, mission: Mission, *, bus: Bus, incarnation: int, speed: float = 1.0, patience: float = 30.0
+        self,
+        mission: Mission,
+        *,
+        bus: Bus,
+        incarnation: int,
+        speed: float = 1.0,
+        patience: float = 30.0,
+        journal: Journal | None = None,
+        returning: float = RETURN_TIMEOUT,
     ) -> None:
         self._mission = mission
         self._bus = bus
         self._speed = speed
         self._patience = patience
-        self._clock = MissionClock(speed)
+        self._returning = returning
+        self._clock: MissionClock | None = None
         self._keys = Keys(mission.name)
-        self._messenger = Messenger(bus, self._keys, WORLD, incarnation, self._clock.now)
-        self._world = World(mission, self._clock.now(), self._tell)
-        self._desk = ChaosDesk(self._world, self._messenger, self._clock.now, self._publish_rules)
+        self._history = History(mission, journal, self._tell)
+        self._world = self._history.world
+        self._untold: list[tuple[int, Happening]] = []
+        self._awaited = {robot for robot, body in self._world.bodies.items() if body.present}
+        if self._world.has_launcher:
+            self._awaited.add(LAUNCHER)
+        self._all_back = asyncio.Event()
+        if journal is not None:
+            incarnation = journal.next_incarnation(incarnation)
+        self._messenger = Messenger(bus, self._keys, WORLD, incarnation, self._now)
+        self._desk = ChaosDesk(self._history, self._messenger, self._now, self._settle)
         self._told_rules: dict[str, Any] = {}
         self._published: dict[str, tuple[int, TaskView]] = {}
         self._told_stage: tuple[str, int] | None = None
@@ -66,7 +96,7 @@ class WorldServer:
         """Serve until the mission is over; its summary.
 
         Raises:
-            UserError: another world server serves this mission.
+            UserError: another world server serves this mission, or the journal cannot be written any more.
         """
         registrations: list[Registration] = []
         try:
@@ -74,15 +104,14 @@ class WorldServer:
             alive, launcher, command = map(self._keys.build, (Kind.ALIVE, Kind.LAUNCHER, Kind.CHAOS_COMMAND))
             registrations.append(await self._bus.watch_presence(alive, self._see))
             registrations.append(await self._bus.watch_presence(launcher, self._see))
+            await self._await_return()
             registrations.append(await self._bus.answer(command, self._desk.answer))
-            give_up_waiting = self._clock.now() + self._patience * self._speed
+            clock = self._clock = MissionClock(self._speed, since=self._history.now)
+            give_up_waiting = self._now() + self._patience * self._speed
             while not self._world.over:
-                now = self._clock.now()
-                if not self._world.missing() or (now >= give_up_waiting and self._world.some_there()):
-                    self._world.begin(now)
-                self._world.advance(now)
-                self._publish(now)
-                await self._clock.sleep_until(now + max(STEP, LEAST_STEP * self._speed))
+                now = self._now()
+                self._step(now, give_up_waiting)
+                await clock.sleep_until(now + max(STEP, LEAST_STEP * self._speed))
             await self._say_farewell()
             return self._world.summary()
         finally:
@@ -102,14 +131,35 @@ class WorldServer:
         for kind in (Kind.ACTION, Kind.DECISION, Kind.LINK, Kind.CHAOS_DEED):
             await messenger.listen(keys.build(kind), self._receive)
 
+    def _now(self) -> float:
+        """Mission time, in seconds; until all are back who were there when another server ended, it stands still."""
+        return self._history.now if self._clock is None else self._clock.now()
+
+    async def _await_return(self) -> None:
+        """Wait for those who were there according to the journal; who does not come back in time is gone."""
+        if self._awaited:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(self._returning):
+                    await self._all_back.wait()
+        for name in sorted(self._awaited):
+            self._take_presence(name, False)
+
+    def _step(self, now: float, give_up_waiting: float) -> None:
+        if not self._world.missing() or (now >= give_up_waiting and self._world.some_there()):
+            self._history.begin(now)
+        # Between two changes the world need not be moved more often than somebody looks at its progress.
+        if now >= min(self._history.next_change, self._refresh_due, self._status_due):
+            self._history.advance(now)
+        self._publish(now)
+
     async def _say_farewell(self) -> None:
         """Tell everybody that the mission is over until all have reported for the last time, or the limit has passed."""
         loop = asyncio.get_running_loop()
         until = loop.time() + LINGER
         while loop.time() < until and not self._all_reported():
-            self._publish_all(self._clock.now())
+            self._publish_all(self._now())
             await asyncio.sleep(0.1)
-        self._publish_all(self._clock.now())
+        self._publish_all(self._now())
 
     def _all_reported(self) -> bool:
         there = [robot for robot, body in self._world.bodies.items() if body.present]
@@ -122,9 +172,18 @@ class WorldServer:
             self._messenger.drop(error.reason, "an unknown key", str(error))
             return
         if parsed.kind is Kind.LAUNCHER:
-            self._world.launcher(present, self._clock.now())
+            self._take_presence(LAUNCHER, present)
         elif parsed.kind is Kind.ALIVE and parsed.robot is not None:
-            self._world.presence(parsed.robot, present, self._clock.now())
+            self._take_presence(parsed.robot, present)
+
+    def _take_presence(self, name: str, present: bool) -> None:
+        if name == LAUNCHER:
+            self._history.launcher(present, self._now())
+        else:
+            self._history.presence(name, present, self._now())
+        self._awaited.discard(name)
+        if not self._awaited:
+            self._all_back.set()
 
     def _receive(self, _: Key, message: Message) -> None:
         if message.sender not in {LAUNCHER, *self._world.bodies}:
@@ -132,29 +191,32 @@ class WorldServer:
             return
         match message:
             case DeedDone():
-                self._world.done(message.number, self._clock.now())
+                self._history.done(message, self._now())
             case Action():
-                self._world.act(message, self._clock.now())
+                self._history.act(message, self._now())
             case DecisionMade():
-                self._world.decided(message, self._clock.now())
+                self._history.decided(message, self._now())
             case LinkReport():
-                self._world.reported(message, self._clock.now())
+                self._history.reported(message, self._now())
 
     def _tell(self, happening: Happening) -> None:
-        _log.info("%7.1f s  %s", happening.elapsed, happening.text)
-        self._send_event(
-            happening.kind, happening.text, happening.elapsed, robot=happening.robot, task=happening.task, details={}
-        )
+        self._untold.append((self._world.trial, happening))
+
+    def _settle(self) -> None:
+        """Commit what went into the world, then tell what came of it."""
+        self._history.commit()
+        untold, self._untold = self._untold, []
+        for trial, one in untold:
+            _log.info("%7.1f s  %s", one.elapsed, one.text)
+            details = dict(one.details)
+            self._send_event(
+                one.kind, one.text, one.elapsed, trial=trial, robot=one.robot, task=one.task, details=details
+            )
+        if self._rules() != self._told_rules:
+            self._publish_rules()
 
     def _send_event(self, kind: str, text: str, elapsed: float, **fields: Any) -> None:
-        self._messenger.send(
-            Kind.EVENT,
-            kind=kind,
-            text=text[:LONGEST_LINE],
-            elapsed=max(elapsed, 0.0),
-            trial=self._world.trial,
-            **fields,
-        )
+        self._messenger.send(Kind.EVENT, kind=kind, text=text[:LONGEST_LINE], elapsed=max(elapsed, 0.0), **fields)
 
     def _order(self, order: Order, now: float) -> None:
         """Ask whoever holds the processes; again each second, until it is seen to be done."""
@@ -162,13 +224,13 @@ class WorldServer:
             self._ordered[order.number] = now
             text = f"{order.deed} {order.robot}: {order.because}"
             details = {"deed": order.deed.value, "number": order.number}
-            self._send_event("order", text, self._world.elapsed, robot=order.robot, details=details)
+            trial = self._world.trial
+            self._send_event("order", text, self._world.elapsed, trial=trial, robot=order.robot, details=details)
 
     def _publish(self, now: float) -> None:
+        self._settle()
         for order in self._world.orders():
             self._order(order, now)
-        if self._rules() != self._told_rules:
-            self._publish_rules()
         stage = (self._world.stage.value, self._world.trial)
         if now >= self._refresh_due or stage != self._told_stage:
             self._told_stage = stage
@@ -183,6 +245,7 @@ class WorldServer:
             self._publish_status(now)
 
     def _publish_all(self, now: float) -> None:
+        self._settle()
         self._publish_rules()
         for robot in self._world.bodies:
             self._messenger.send(Kind.SENSE_ROBOT, key_robot=robot, **self._body_fields())
@@ -232,11 +295,15 @@ class WorldServer:
         return {"mission": self._world.stage.value, "trial": self._world.trial, "learning": self._world.learning}
 
     def _answer_rules(self, _: str) -> list[Sample]:
+        self._settle()
         key = self._keys.build(Kind.CHAOS_RULES)
         return [Sample(key, self._messenger.compose(Kind.CHAOS_RULES, **self._rules()))]
 
     def _answer_tasks(self, query: str) -> list[Sample]:
-        self._world.advance(self._clock.now())
+        now = self._now()
+        if now >= self._history.moved + STEP:
+            self._history.advance(now)
+        self._settle()
         keys = {self._keys.build(Kind.SENSE_TASK, task=task): view for task, view in self._world.tasks().items()}
         return [
             Sample(key, self._messenger.compose(Kind.SENSE_TASK, **self._task_fields(view)))
@@ -245,6 +312,7 @@ class WorldServer:
         ]
 
     def _answer_bodies(self, query: str) -> list[Sample]:
+        self._settle()
         keys = [self._keys.build(Kind.SENSE_ROBOT, robot=robot) for robot in self._world.bodies]
         return [
             Sample(key, self._messenger.compose(Kind.SENSE_ROBOT, **self._body_fields()))

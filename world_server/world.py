@@ -6,8 +6,8 @@ here waits, sends or reads a clock: the server and the simulator both drive it, 
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from lalliance_agents.config import Mission, Phase
 from lalliance_agents.errors import UserError
-from lalliance_agents.faults import Crash, Fault, Hang, describe
+from lalliance_agents.faults import Crash, Fault, Hang, describe, robot_of
 from lalliance_agents.wire.messages import Action, Blindness, DecisionMade, Effect, LinkReport, LinkRule
 from world_server import environments
 from world_server.environments.base import Environment, TaskView, Work
@@ -59,6 +59,9 @@ class Happening:
     elapsed: float
     robot: str | None = None
     task: str | None = None
+    details: Mapping[str, str | bool] = field(default_factory=dict)
+    """What the text says, for programs: of a takeover `from` and `cause`; of a fault its `name` and whether it `begins`; of
+    a trial whether it `begins`."""
 
 
 class World:
@@ -87,7 +90,6 @@ class World:
         self._phases = [phase for phase in mission.phases for _ in range(phase.trials)]
         self._phase: Phase = self._phases[0]
         self._environment = self._fresh_environment()
-        self._orders: dict[int, Order] = {}
         self.makespan: float | None = None
 
     def __repr__(self) -> str:
@@ -132,8 +134,10 @@ class World:
         seed = np.random.SeedSequence([self.mission.seed, self.trial]).generate_state(1, np.uint64)[0]
         return environments.create(self.mission, seed=int(seed))
 
-    def _report(self, kind: str, text: str, *, robot: str | None = None, task: str | None = None) -> None:
-        self._tell(Happening(kind, text, self.elapsed, robot, task))
+    def _report(
+        self, kind: str, text: str, *, robot: str | None = None, task: str | None = None, **details: str | bool
+    ) -> None:
+        self._tell(Happening(kind, text, self.elapsed, robot, task, details))
 
     def begin(self, now: float) -> None:
         """Start the first trial, with whoever is there."""
@@ -155,7 +159,7 @@ class World:
             body.task = None
             if self.live and body.present:
                 self.failures.presence(robot, True, 0.0)
-        self._report("trial", f"trial {self.trial} begins ({self.learning} learning)")
+        self._report("trial", f"trial {self.trial} begins ({self.learning} learning)", begins=True)
         self._let_faults_happen()
 
     def presence(self, robot: str, present: bool, now: float) -> None:
@@ -184,7 +188,7 @@ class World:
         body = self.bodies.get(action.sender)
         if body is None:
             return
-        if (action.trial, action.task) == (self.trial, body.task) and now < body.refreshed + DEAD_MAN:
+        if self.is_refresh(action, now):
             body.fewest = action.fewest
             body.refreshed = max(body.refreshed, now)
             return
@@ -200,6 +204,19 @@ class World:
                 self.ledger.began(action.sender, task, self.elapsed)
             self._rest()
 
+    def is_refresh(self, action: Action, now: float) -> bool:
+        """Whether an action at `now` only says once more what its robot's body works on."""
+        body = self.bodies.get(action.sender)
+        if body is None:
+            return False
+        return (action.trial, action.task) == (self.trial, body.task) and now < body.refreshed + DEAD_MAN
+
+    def refreshed(self, robot: str, until: float) -> None:
+        """What `robot` said last was refreshed time and again, the last time at `until`, which may be yet to come."""
+        body = self.bodies.get(robot)
+        if body is not None:
+            body.refreshed = max(body.refreshed, until)
+
     def decided(self, made: DecisionMade, now: float) -> None:
         """A robot reports a decision."""
         self.advance(now)
@@ -212,14 +229,15 @@ class World:
                 f"{takeover['to']} takes {takeover['task']} from {takeover['from']} ({takeover['cause']})",
                 robot=made.sender,
                 task=made.task,
+                **{"from": takeover["from"], "cause": takeover["cause"]},
             )
 
     def reported(self, report: LinkReport, now: float) -> None:
-        """A robot reports what it sent and received, and what faults did to what it received."""
-        self.advance(now)
+        """A robot reports what it sent and received, and what faults did to what it received; no time passes by that."""
         if report.sender in self.bodies:
             before = self.ledger.reported(report)
-            self.failures.touched(_newly(report, before), self.elapsed)
+            elapsed = max(self._now, now) - self._began if self.trial else 0.0
+            self.failures.touched(_newly(report, before), elapsed)
 
     def launcher(self, present: bool, now: float) -> None:
         """Whoever holds the robots' processes came or went."""
@@ -281,7 +299,8 @@ class World:
     def _changed(self, changes: list[Change]) -> None:
         for change in changes:
             text = describe(change.entry.fault)
-            self._report("fault", f"fault: {text}" if change.on else f"fault is over: {text}")
+            words = f"fault: {text}" if change.on else f"fault is over: {text}"
+            self._report("fault", words, robot=robot_of(change.entry.fault), name=change.entry.name, begins=change.on)
             if change.on and isinstance(change.entry.fault, Crash | Hang) and not self.has_launcher:
                 self._report("warning", f"nobody here can reach the robots' processes: {text} has to be made by hand")
         if changes:
@@ -374,7 +393,7 @@ class World:
             self._phases.pop(0)
         if self._phases:
             self._pause_until = self._now + TRIAL_PAUSE
-            self._report("trial", f"trial {self.trial} complete after {self.makespan:.1f} s")
+            self._report("trial", f"trial {self.trial} complete after {self.makespan:.1f} s", begins=False)
         else:
             self._end(Stage.COMPLETE, f"complete after {self.makespan:.1f} s")
 

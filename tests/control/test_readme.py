@@ -29,7 +29,7 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
     (tmp_path / "missions").symlink_to(MISSIONS)
     [mission] = blocks("yaml")
     (tmp_path / "two-rooms.yaml").write_text(mission)
-    [code] = blocks("python")
+    [code] = [block for block in blocks("python") if "def behaviors" in block]
     (tmp_path / "my_robot.py").write_text(code)
     with Processes(tmp_path) as tree:
         yield tree
@@ -78,9 +78,10 @@ def test_faults_are_injected_and_healed_while_a_mission_runs(processes: Processe
     read_until(running, "pusher starts")
     [block] = CHAOS
     said = [processes.chaos(*command[1:]) for command in commands(block)]
-    assert [line.split(":")[0] for line in said] == [
-        "2-hang", "3-link", "4-partition", "Mission material_handling", "healed 2-hang, 3-link, 4-partition"
-    ]  # fmt: skip
+    beginnings = [line.split(":")[0] for line in said]
+    assert beginnings[:4] == ["2-hang", "3-link", "4-partition", "Mission material_handling"]
+    # On a busy machine those that last a few seconds may be over by now.
+    assert re.match(r"healed (2-hang, )?3-link(, 4-partition)?$", beginnings[4])
     assert re.search("^2-hang .* fired at", said[3], flags=re.MULTILINE)
     assert "partition lifter carrier | pusher forklift" in said[3]
 

@@ -40,8 +40,12 @@ class Processes:
 
     def start(self, *arguments: str | Path) -> "subprocess.Popen[str]":
         """Start `lalliance` with `arguments`; its output is piped."""
+        return self.start_module("mission_control", *arguments)
+
+    def start_module(self, module: str, *arguments: str | Path) -> "subprocess.Popen[str]":
+        """Start a module of Python with `arguments`; its output is piped."""
         process = subprocess.Popen(
-            [sys.executable, "-m", "mission_control", *map(str, arguments)],
+            [sys.executable, "-m", module, *map(str, arguments)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

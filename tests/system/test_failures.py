@@ -1,5 +1,6 @@
 """Processes that die, at any time, and what is left: the mission goes on, and no process stays behind."""
 
+import contextlib
 import os
 import signal
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 from support.processes import MISSIONS, Processes, read_until, until
 
 from lalliance_agents.bus.router import free_endpoint
+from mission_control.keeper import RESTARTS
 
 SMALL = """
 name: small
@@ -134,16 +136,37 @@ def test_a_death_by_a_signal_without_a_name_is_told_too(processes: Processes, sm
     run = processes.start("run", small, "--speed", "2", "--plain")
     read_until(run, "right starts")
     os.kill(processes.alive("world")[0], signal.SIGRTMIN + 1)
-    _, err = run.communicate(timeout=20)
-    assert run.returncode == 1
-    assert "the world server ended without a summary (killed by signal 35)" in err
+    read_until(run, "the world server ended (killed by signal 35); starting it again")
+    out, err = run.communicate(timeout=60)
+    assert run.returncode == 0, err
+    assert "Mission small complete" in out
 
 
-def test_a_world_server_that_dies_ends_the_run_with_a_sentence(processes: Processes, small: Path) -> None:
+def test_a_world_server_that_dies_again_and_again_ends_the_run_with_a_sentence(
+    processes: Processes, small: Path
+) -> None:
     run = processes.start("run", small, "--speed", "2", "--plain")
     read_until(run, "right starts")
-    os.kill(processes.alive("world")[0], signal.SIGKILL)
+    deaths = 0
+    while run.poll() is None:
+        for world in processes.alive("world"):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(world, signal.SIGKILL)
+                deaths += 1
     _, err = run.communicate(timeout=20)
     assert run.returncode == 1
-    assert "the world server ended without a summary (killed by SIGKILL)" in err
+    assert deaths >= RESTARTS + 1
+    assert f"the world server ended {RESTARTS + 1} times without a summary (at last killed by SIGKILL)" in err
     assert processes.alive() == []
+
+
+def test_a_world_server_that_ends_by_itself_is_not_started_again(processes: Processes, small: Path) -> None:
+    endpoint = free_endpoint()
+    router = processes.start("router", "--listen", endpoint)
+    read_until(router, "listens")
+    first = processes.start("run", small, "--plain", "--connect", endpoint)
+    read_until(first, "right starts")
+    second = processes.run("run", small, "--plain", "--connect", endpoint)
+    assert second.returncode == 2
+    assert "another world server serves mission small on this bus already" in second.stderr
+    assert first.poll() is None

@@ -204,3 +204,16 @@ async def test_a_second_world_server_of_a_mission_is_refused_and_the_first_goes_
             with pytest.raises(UserError, match="another world server serves mission pair on this bus already"):
                 await WorldServer(served.mission, bus=bus, incarnation=2).run()
         assert not served.task.done()
+
+
+async def test_events_say_for_programs_what_their_text_says_for_people() -> None:
+    stuck = PAIR + "faults: [{at: 1, until: 2, robot: left, kind: stuck}]\n"
+    async with Served(stuck) as served:
+        await served.appear("left", "right")
+        await served.work("left", "a", 3)
+        told = [(m.kind, m.robot, m.details) for _, m in served.heard if isinstance(m, Event) and m.details]
+        assert told == [
+            ("trial", None, {"begins": True}),
+            ("fault", "left", {"name": "1-stuck", "begins": True}),
+            ("fault", "left", {"name": "1-stuck", "begins": False}),
+        ]
