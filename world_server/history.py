@@ -250,7 +250,7 @@ def _put_in(world: World, entry: Entry) -> None:
             action = decode(Action, content)
             world.act(action, at)
             if entry.until is not None:
-                world.refreshed(action.sender, entry.until)
+                world.bodies.refresh(action.sender, entry.until)
         case Input.DECIDED:
             world.decided(decode(DecisionMade, content), at)
         case Input.REPORTED:

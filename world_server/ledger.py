@@ -13,7 +13,7 @@ from copy import deepcopy
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from lalliance_agents.wire.messages import DecisionMade, LinkReport
+from lalliance_agents.wire.messages import DecisionMade, Effect, LinkReport
 
 _TAKEOVERS = {"silence", "impatience", "released"}
 
@@ -138,13 +138,13 @@ class Ledger:
         if latest is not None and latest.ended is None:
             latest.ended = cause[:MOST_LETTERS]
 
-    def reported(self, report: LinkReport) -> LinkReport | None:
-        """A robot's counters, which replace the ones it reported before in this incarnation; its report before."""
+    def reported(self, report: LinkReport) -> list[Effect]:
+        """A robot's counters, which replace the ones it reported before in this incarnation; what faults did since."""
         before = self._links.get(report.sender)
         if before is not None and before.incarnation != report.incarnation:
             self._earlier_lives.add(before)
         self._links[report.sender] = report
-        return before
+        return _newly(report, before)
 
     def lives(self) -> dict[str, int]:
         """The latest incarnation of each robot that has reported its counters."""
@@ -204,3 +204,15 @@ def _detected_at(made: DecisionMade, at: float) -> float | None:
 
 def _number(value: str | float | None) -> float | None:
     return value if isinstance(value, int | float) and math.isfinite(value) else None
+
+
+def _newly(report: LinkReport, before: LinkReport | None) -> list[Effect]:
+    """What faults did since the robot's report before, in this life."""
+    known: dict[tuple[str, str], int] = {}
+    if before is not None and before.incarnation == report.incarnation:
+        known = {(one.fault, one.sender): one.count for one in before.effects}
+    return [
+        Effect(fault=one.fault, sender=one.sender, count=more)
+        for one in report.effects
+        if (more := one.count - known.get((one.fault, one.sender), 0)) > 0
+    ]

@@ -78,7 +78,7 @@ class WorldServer:
         self._history = History(mission, journal, self._tell)
         self._world = self._history.world
         self._untold: list[tuple[int, Happening]] = []
-        self._awaited = {robot for robot, body in self._world.bodies.items() if body.present}
+        self._awaited = set(self._world.bodies.there())
         if self._world.has_launcher:
             self._awaited.add(LAUNCHER)
         self._all_back = asyncio.Event()
@@ -162,8 +162,7 @@ class WorldServer:
         self._publish_all(self._now())
 
     def _all_reported(self) -> bool:
-        there = [robot for robot, body in self._world.bodies.items() if body.present]
-        return all(self._world.ledger.has_final(robot) for robot in there)
+        return all(self._world.ledger.has_final(robot) for robot in self._world.bodies.there())
 
     def _see(self, key: str, present: bool) -> None:
         try:

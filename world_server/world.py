@@ -1,8 +1,7 @@
 """The world's core: tasks, bodies, trials and faults, moved by whoever hands in the time.
 
 The world waits until its team is there, runs the trials of the mission one after the other, and ends complete or failed.
-A body works on what its robot last said, only while that is refreshed (dead-man switch) and its process is present. Nothing
-here waits, sends or reads a clock: the server and the simulator both drive it, and tell others what it returns.
+Nothing here waits, sends or reads a clock: the server and the simulator both drive it, and tell others what it returns.
 """
 
 import math
@@ -16,8 +15,9 @@ import numpy as np
 from lalliance_agents.config import Mission, Phase
 from lalliance_agents.errors import UserError
 from lalliance_agents.faults import Crash, Fault, Hang, describe, robot_of
-from lalliance_agents.wire.messages import Action, Blindness, DecisionMade, Effect, LinkReport, LinkRule
+from lalliance_agents.wire.messages import Action, Blindness, DecisionMade, LinkReport, LinkRule
 from world_server import environments
+from world_server.bodies import Bodies
 from world_server.environments.base import Environment, TaskView, Work
 from world_server.failures import Change, Failures, Order
 from world_server.ledger import Ledger
@@ -25,8 +25,6 @@ from world_server.ledger import Ledger
 #: Time between two looks of a world server at its world, and between two refreshes of what it publishes, in seconds.
 STEP = 0.05
 REFRESH_PERIOD = 1.0
-#: A body stops when its action was not refreshed for this long, in seconds.
-DEAD_MAN = 2.5
 #: Time between two trials, in seconds: everybody can sense the end of the one before the next begins.
 TRIAL_PAUSE = 1.0
 
@@ -38,16 +36,6 @@ class Stage(StrEnum):
     RUNNING = "running"
     COMPLETE = "complete"
     FAILED = "failed"
-
-
-@dataclass(slots=True)
-class Body:
-    """What the world knows of one robot."""
-
-    present: bool = False
-    task: str | None = None
-    refreshed: float = -math.inf
-    fewest: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +65,7 @@ class World:
         self.mission = mission
         self.stage = Stage.WAITING
         self.trial = 0
-        self.bodies = {robot: Body() for robot in mission.robots}
+        self.bodies = Bodies(mission)
         self.ledger = Ledger(list(mission.tasks))
         self.failures = Failures(mission)
         #: Whether somebody is there who can kill, start, stop and continue the robots' processes.
@@ -122,13 +110,11 @@ class World:
 
     def missing(self) -> list[str]:
         """The robots that should be there from the beginning, and are not."""
-        return [
-            robot for robot, body in self.bodies.items() if not body.present and self.mission.robots[robot].joins == 0
-        ]
+        return self.bodies.missing()
 
     def some_there(self) -> bool:
         """Whether there is any robot to begin with."""
-        return any(body.present for body in self.bodies.values())
+        return bool(self.bodies.there())
 
     def _fresh_environment(self) -> Environment:
         seed = np.random.SeedSequence([self.mission.seed, self.trial]).generate_state(1, np.uint64)[0]
@@ -190,7 +176,7 @@ class World:
             return
         if self.is_refresh(action, now):
             body.fewest = action.fewest
-            body.refreshed = max(body.refreshed, now)
+            self.bodies.refresh(action.sender, now)
             return
         self.advance(now)
         body.fewest = action.fewest
@@ -206,16 +192,7 @@ class World:
 
     def is_refresh(self, action: Action, now: float) -> bool:
         """Whether an action at `now` only says once more what its robot's body works on."""
-        body = self.bodies.get(action.sender)
-        if body is None:
-            return False
-        return (action.trial, action.task) == (self.trial, body.task) and now < body.refreshed + DEAD_MAN
-
-    def refreshed(self, robot: str, until: float) -> None:
-        """What `robot` said last was refreshed time and again, the last time at `until`, which may be yet to come."""
-        body = self.bodies.get(robot)
-        if body is not None:
-            body.refreshed = max(body.refreshed, until)
+        return self.bodies.is_refresh(action, self.trial, now)
 
     def decided(self, made: DecisionMade, now: float) -> None:
         """A robot reports a decision."""
@@ -235,9 +212,8 @@ class World:
     def reported(self, report: LinkReport, now: float) -> None:
         """A robot reports what it sent and received, and what faults did to what it received; no time passes by that."""
         if report.sender in self.bodies:
-            before = self.ledger.reported(report)
             elapsed = max(self._now, now) - self._began if self.trial else 0.0
-            self.failures.touched(_newly(report, before), elapsed)
+            self.failures.touched(self.ledger.reported(report), elapsed)
 
     def launcher(self, present: bool, now: float) -> None:
         """Whoever holds the robots' processes came or went."""
@@ -262,9 +238,8 @@ class World:
         """
         self.advance(now)
         if not self._runs_live:
-            raise UserError(
-                f"faults belong to the live trial of a running mission; this one is {self.stage} {self._where}"
-            )
+            where = f"{self.stage} (trial {self.trial} of {self.trials_planned})"
+            raise UserError(f"faults belong to the live trial of a running mission; this one is {where}")
         if isinstance(fault, Crash | Hang) and not self.has_launcher:
             raise UserError(
                 f"{describe(fault)}: nobody here can reach the robots' processes; expected a mission started by "
@@ -288,10 +263,6 @@ class World:
         self._changed(changes)
         return f"healed {', '.join(healed)}" if healed else "no fault is in force"
 
-    @property
-    def _where(self) -> str:
-        return f"(trial {self.trial} of {self.trials_planned})"
-
     def _let_faults_happen(self) -> None:
         if self._runs_live:
             self._changed(self.failures.advance(self.elapsed))
@@ -312,7 +283,8 @@ class World:
             until = min(now, self._next_instant())
             if self._pause_until is None:
                 self._work(until)
-                self._stop_dead()
+                if self.bodies.stop_dead(self._now):
+                    self._rest()
                 self._let_faults_happen()
             else:
                 self._now = until
@@ -324,10 +296,8 @@ class World:
         """The next instant at which something other than work changes."""
         if self._pause_until is not None:
             return self._pause_until
-        ends = [body.refreshed + DEAD_MAN for body in self.bodies.values() if body.task is not None]
-        if self.live:
-            ends.append(self._began + self.failures.next_instant(self.elapsed))
-        return min([self._began + self.mission.deadline, *ends])
+        due = min(self._began + self.mission.deadline, self.bodies.next_stop())
+        return min(due, self._began + self.failures.next_instant(self.elapsed)) if self.live else due
 
     def next_change(self) -> float:
         """When a task will be completed or become (not) applicable, a fault begin or end, or the trial, at the latest.
@@ -341,7 +311,7 @@ class World:
         return min(self._next_instant(), self._now + self._environment.next_change(self._actions()))
 
     def _actions(self) -> dict[str, Work]:
-        working = {robot: body.task for robot, body in self.bodies.items() if body.task is not None and body.present}
+        working = self.bodies.working()
         if not (self.live and self.failures.hold_up):
             return {robot: Work(task) for robot, task in working.items()}
         return {
@@ -349,16 +319,6 @@ class World:
             for robot, task in working.items()
             if not self.failures.is_hung(robot)
         }
-
-    def _stop_dead(self) -> None:
-        """The dead-man switch: bodies whose action was not refreshed for too long stop, until their robot acts again."""
-        dead = [
-            body for body in self.bodies.values() if body.task is not None and self._now >= body.refreshed + DEAD_MAN
-        ]
-        for body in dead:
-            body.task = None
-        if dead:
-            self._rest()
 
     def _rest(self) -> None:
         """Let the environment know at once who works on what, so that no change is lost between two steps."""
@@ -389,7 +349,7 @@ class World:
         # An environment may have nothing to do from the start.
         self.makespan = self.elapsed if last is None else last
         self.ledger.trials.append(self.makespan)
-        while self._phases and self._phase.until == "full" and self.full and self._phases[0] is self._phase:
+        while self._phases and self._phase.until == "full" and self.bodies.full() and self._phases[0] is self._phase:
             self._phases.pop(0)
         if self._phases:
             self._pause_until = self._now + TRIAL_PAUSE
@@ -402,12 +362,6 @@ class World:
         if stage is Stage.FAILED:
             self.makespan = None
         self._report(stage.value, text)
-
-    @property
-    def full(self) -> bool:
-        """Whether the monitors of every robot that is there hold all the samples they keep."""
-        there = [robot for robot, body in self.bodies.items() if body.present]
-        return all(self.bodies[robot].fewest >= self.mission.parameters_of(robot).trials for robot in there)
 
     @property
     def _runs_live(self) -> bool:
@@ -444,15 +398,3 @@ class World:
             "faults": self.failures.report(),
             **self.ledger.summary(),
         }
-
-
-def _newly(report: LinkReport, before: LinkReport | None) -> list[Effect]:
-    """What faults did since the robot's report before, in this life."""
-    known: dict[tuple[str, str], int] = {}
-    if before is not None and before.incarnation == report.incarnation:
-        known = {(one.fault, one.sender): one.count for one in before.effects}
-    return [
-        Effect(fault=one.fault, sender=one.sender, count=more)
-        for one in report.effects
-        if (more := one.count - known.get((one.fault, one.sender), 0)) > 0
-    ]

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from support.driven import BOX, MISSIONS, Driven, crash_image, mission_of
 
 from lalliance_agents.wire.messages import Effect, LinkReport
+from world_server.bodies import DEAD_MAN
 from world_server.history import History, recall
 from world_server.journal import Journal
-from world_server.world import DEAD_MAN
 
 STEPS = st.tuples(
     st.sampled_from([0.0, 0.001, 0.05, 0.3, 1.0, 2.0, DEAD_MAN, 4.0]),

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from lalliance_agents.config import Mission
 from lalliance_agents.mission_file import parse_mission
 from lalliance_agents.wire.messages import Action, DecisionMade
+from world_server.bodies import DEAD_MAN
 from world_server.environments.base import Completion, Environment, TaskView, Work
-from world_server.world import DEAD_MAN, TRIAL_PAUSE, Happening, Stage, World
+from world_server.world import TRIAL_PAUSE, Happening, Stage, World
 
 PAIR = """
 name: pair
