@@ -199,14 +199,14 @@ def _others_rule(mission: Mission, fault: Fault) -> bool:
 
 
 def _spared(evidence: Evidence, fault: Fault, since: float, until: float) -> float:
-    """The chance that no message between robots that share a task is touched."""
+    """The chance that no message between robots that share a task is touched; draws of different links do not depend."""
     mission, chance = evidence.mission, 1.0
     touched = _least_chance(fault)
     for senders, receivers in _pairs(fault):
         for sender in mission.robots:
-            mates = [mate for mate in mission.teammates(sender) if fits(mate, receivers)]
-            if mates and fits(sender, senders):
-                chance *= (1 - touched) ** _least_messages(evidence, sender, mates, since, until)
+            for mate in mission.teammates(sender):
+                if fits(sender, senders) and fits(mate, receivers):
+                    chance *= (1 - touched) ** _least_messages(evidence, sender, mate, since, until)
     return chance
 
 
@@ -223,22 +223,23 @@ def _pairs(fault: Fault) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
             return []
 
 
-def _least_messages(evidence: Evidence, sender: str, mates: list[str], since: float, until: float) -> int:
-    """How many messages `sender` sent at least to one of `mates`."""
-    own = evidence.mission.parameters_of(sender)
+def _least_messages(evidence: Evidence, sender: str, mate: str, since: float, until: float) -> int:
+    """How many messages of `sender` came at least to where `mate` was there to hear them."""
+    own, period = evidence.mission.parameters_of(sender), evidence.mission.control_period
     if own.is_literal(Erratum.IDLE_HEARTBEAT):
         return 0
     count = 0
     for start, end in evidence.history.running.get(sender, ()):
-        begin, stop = max(start + 2 * evidence.mission.control_period, since), min(end, until)
-        if stop > begin and not _alone(evidence, sender, mates, begin, stop):
-            count += max(math.floor((stop - begin - evidence.mission.control_period) * own.broadcast_rate) - 1, 0)
+        for birth, death in evidence.history.running.get(mate, ()):
+            begin, stop = max(start + 2 * period, birth, since), min(end, death, until)
+            if stop > begin and not _unheard(evidence, sender, mate, begin, stop):
+                count += max(math.floor((stop - begin - period) * own.broadcast_rate) - 1, 0)
     return count
 
 
-def _alone(evidence: Evidence, sender: str, mates: list[str], since: float, until: float) -> bool:
-    """Whether `sender` was for a while on a task that none of `mates` can do, and so was not heard by them."""
-    shared = {task for mate in mates for task in evidence.mission.robots[mate].tasks}
+def _unheard(evidence: Evidence, sender: str, mate: str, since: float, until: float) -> bool:
+    """Whether `sender` was for a while on a task that `mate` cannot do, and so was not heard by it."""
+    shared = evidence.mission.robots[mate].tasks
     return any(
         one.robot == sender and one.task not in shared and one.since <= until and one.until >= since
         for one in evidence.history.spans
