@@ -17,7 +17,7 @@ from typing import Any, Literal, TypeVar, cast
 
 from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.config import Mission
-from lalliance_agents.errors import LallianceError, UserError
+from lalliance_agents.errors import UserError
 from lalliance_agents.faults import Fault
 from lalliance_agents.wire.messages import DecisionMade, Event, Message, Status
 from lalliance_testing.happenings import Happened, of_decision, of_event
@@ -95,7 +95,7 @@ class Real:
         self._launching: asyncio.Task[dict[str, Any]] | None = None
         self._told_to_close: asyncio.Event | None = None
         self._summary: dict[str, Any] | None = None
-        self._error: LallianceError | None = None
+        self._error: Exception | None = None
         self._over = False
 
     def __repr__(self) -> str:
@@ -127,10 +127,10 @@ class Real:
         self._ready.set()
         try:
             self._summary = await self._launching
-        except LallianceError as error:
-            self._error = error
         except asyncio.CancelledError:
             return
+        except Exception as error:
+            self._error = error
         with self._news:
             self._over = True
             self._news.notify_all()
@@ -199,7 +199,10 @@ class Real:
         if self._loop is None or self._over:
             work.close()
             raise UserError(f"mission {self._mission.name} does not run any more: {self.ended}")
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result(ANSWER)
+        try:
+            return asyncio.run_coroutine_threadsafe(work, self._loop).result(ANSWER)
+        except TimeoutError:
+            raise LaunchError(f"mission {self._mission.name} did not answer within {ANSWER:g} s") from None
 
     def kill(self, what: str) -> None:
         """Kill the router or the world server."""
