@@ -3,7 +3,10 @@ PYTHON ?= python3
 BIN := .venv/bin
 SETUP := .venv/.set-up
 
-.PHONY: demo test check clean
+# Tests that start no processes may run side by side; the others need the machine for themselves.
+SIDE_BY_SIDE := tests/agent tests/model tests/study tests/wire tests/world tests/test_mission_file.py
+
+.PHONY: demo test campaign check clean
 
 $(SETUP): pyproject.toml constraints.txt
 	@echo "Setting up .venv: this takes about a minute, and a package index"
@@ -15,7 +18,11 @@ demo: $(SETUP)  ## a team of robot processes finishes a mission although one of 
 	$(BIN)/lalliance run missions/material_handling.yaml
 
 test: $(SETUP)
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses auto $(SIDE_BY_SIDE)
+	$(BIN)/pytest $(addprefix --ignore=,$(SIDE_BY_SIDE))
+
+campaign: $(SETUP)  ## random missions with faults, held to what must never fail
+	$(BIN)/lalliance campaign --missions 2000 --seed 1
 
 check: $(SETUP)
 	$(BIN)/ruff check .
