@@ -8,7 +8,7 @@ SETUP := .venv/.set-up
 $(SETUP): pyproject.toml constraints.txt
 	@echo "Setting up .venv: this takes about a minute, and a package index"
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,study]'
 	touch $@
 
 demo: $(SETUP)  ## a team of robot processes finishes a mission although one of them is killed
