@@ -74,7 +74,7 @@ def cost(seed: int, loss: float, tau_rho: float, *, crash: bool) -> Cost:
         makespan=math.nan if summary["makespan"] is None else summary["makespan"],
         needless=len(silences) - needed,
         needed=needed,
-        doubled=doubled(simulator.log, simulator.now),
+        doubled=abs(round(doubled(simulator.log, simulator.now), 4)),
     )
 
 

@@ -13,7 +13,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, PercentFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, PercentFormatter
 
 from lalliance_study.detection.law import Loss, Timing, detection_quantile, suspicions
 from lalliance_study.detection.probe import RATE
@@ -140,7 +140,7 @@ def false_suspicions(rows: Sequence[Suspicions]) -> Figure:
         axes.xaxis.set_major_formatter(PercentFormatter(1.0))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
         ends = {value: _one_suspicion_line(axes, [row for row in own if row.tau_rho == value]) for value in values}
-        _label_ends(axes, 0.82, ends, 0.042)
+        _label_ends(axes, 0.82, ends, 0.037)
     left.set(title="Independent losses", ylabel="false suspicions per pair of robots and hour")
     right.set_title(f"Bursts of {burst:g} messages on average, same share lost")
     _legend(left, real=any(row.source == "real" for row in rows), measured="simulated, 95 % interval")
@@ -190,7 +190,9 @@ def stairs(rows: Sequence[Suspicions]) -> Figure:
         _rates(axes, own, [row.tau_rho for row in own], marker=marker, markersize=4.5, color=colour, label=name)
     axes.set(yscale="log", xlim=(1.95, 6.1), xlabel="silence timeout in periods of the announcements, τ·ρ")
     axes.set_ylabel("false suspicions per pair and hour")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_title(f"{loss:.0%} of the messages lost: only whole periods count")
     axes.legend(loc="lower left")
     return figure
@@ -203,7 +205,7 @@ def detection_time(rows: Sequence[Detections]) -> Figure:
     burst = max((row.burst for row in rows), default=0.0)
     shown = sorted({row.tau_rho for row in rows} & {2.01, 3.0, 5.0, 7.0, 10.0})
     for axes, length in ((left, 0.0), (right, burst)):
-        axes.set(xlim=(0, 0.88), ylim=(-0.03, 2.4), xlabel="share of messages lost, p")
+        axes.set(xlim=(0, 0.88), ylim=(-0.09, 2.4), xlabel="share of messages lost, p")
         axes.xaxis.set_major_formatter(PercentFormatter(1.0))
         ends = {}
         for number, tau_rho in enumerate(shown):

@@ -77,6 +77,19 @@ def suspicions(loss: Loss, timing: Timing) -> float:
     return timing.rate * sum(chances)
 
 
+def dispersion(loss: Loss, timing: Timing) -> float:
+    """The variance of the number of suspicions in a long time, divided by its mean; tau is to be a whole number of periods.
+
+    It would be 1 for independent events. Suspicions of one pair cannot overlap, and after a burst the next one is not near:
+    with q the chance of a suspicion at one message, it is 1 - q (1 + 2k + 2c), where c = 0 for independent losses, else
+    L(1 - p) - 1, from the chain's autocorrelation.
+    """
+    [(count, _)] = timing.counts()
+    chance = loss.all_lost(count) - loss.all_lost(count + 1)
+    after = 0.0 if loss.burst is None else loss.burst * (1 - loss.share) - 1
+    return 1 - chance * (1 + 2 * count + 2 * after)
+
+
 def _older(loss: Loss, timing: Timing, ages: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> float:
     """The mean probability that the last message heard was sent longer ago than each of `ages` (in seconds)."""
     counted = np.clip(ages * timing.rate, 0.0, None)

@@ -9,10 +9,10 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from statistics import fmean, quantiles
+from statistics import fmean, quantiles, stdev
 
 from lalliance_study.detection.cost import COVERAGE, CRASH_TIMES, OWN_TIMES, ROBOTS, TASKS
-from lalliance_study.detection.law import Loss, Timing, detection_quantile, needed_windows, suspicions
+from lalliance_study.detection.law import Loss, Timing, detection_quantile, dispersion, needed_windows, suspicions
 from lalliance_study.detection.plan import BURST, STAIRS_LOSS, TAU_RHOS
 from lalliance_study.detection.probe import RATE
 from lalliance_study.detection.reactions import FAULTS, TAU_RHO
@@ -116,9 +116,10 @@ def agreement(rows: Path) -> str:
         misses = [_deviation(row) for row in whole]
         outside = sum(abs(miss) > 1.96 for miss in misses)
         total = sum(row.times for row in whole)
+        expected = sum(suspicions(*_setting(row)) * row.seconds for row in whole)
         texts.append(
-            f"for {kind}, {len(misses) - outside} of {len(misses)} settings ({total:,} false suspicions) lie within "
-            f"1.96 standard errors of the law, the farthest at {max(map(abs, misses)):.1f}"
+            f"for {kind}, {len(misses) - outside} of {len(misses)} settings lie within 1.96 standard errors of the law, the "
+            f"farthest at {max(map(abs, misses)):.1f} ({total:,} false suspicions, where the law expects {expected:,.0f})"
         )
     timed = load(rows / "detections.csv", Detections)
     far = [abs(row.p50 - detection_quantile(0.5, *_setting(row))) for row in timed]
@@ -135,7 +136,8 @@ def _setting(row: Suspicions | Detections) -> tuple[Loss, Timing]:
 def _deviation(row: Suspicions) -> float:
     """How far a count lies from the law, in standard errors (of a square root, which is nearly normal for small counts too)."""
     expected = suspicions(*_setting(row)) * row.seconds
-    return 2 * (math.sqrt(row.times + 0.375) - math.sqrt(expected + 0.375))
+    scatter = math.sqrt(dispersion(*_setting(row)))
+    return 2 * (math.sqrt(row.times + 0.375) - math.sqrt(expected + 0.375)) / scatter
 
 
 def real(rows: Path) -> str:
@@ -236,6 +238,26 @@ def costs(rows: Path) -> str:
     return _markdown(table)
 
 
+def pairs(rows: Path) -> str:
+    """By how much makespans differ between two settings, mission by mission, with 95 % intervals."""
+    makespans = {(row.seed, row.crash, row.loss, row.tau_rho): row.makespan for row in load(rows / "costs.csv", Cost)}
+    seeds = sorted({key[0] for key in makespans})
+
+    def change(one: tuple[int, float, float], other: tuple[int, float, float]) -> str:
+        changes = [makespans[seed, *one] / makespans[seed, *other] - 1 for seed in seeds]
+        return f"{fmean(changes):+.1%} ± {1.96 * stdev(changes) / math.sqrt(len(changes)):.1%}"
+
+    table = [["crash, p", "τ·ρ = 2.01 against 5", "τ·ρ = 10 against 5", "loss against none, τ·ρ = 5"]]
+    for crash in (0, 1):
+        for loss in (0.0, 0.3, 0.5, 0.6, 0.7, 0.8):
+            plain = (crash, loss, 5.0)
+            others = [
+                change((crash, loss, 2.01), plain), change((crash, loss, 10.0), plain), change(plain, (crash, 0.0, 5.0))
+            ]  # fmt: skip
+            table.append([f"{'one crash' if crash else 'none'}, {loss:.0%}", *others])
+    return _markdown(table)
+
+
 PARTS: dict[str, Callable[[Path], str]] = {
     "setup": setup,
     "late": late,
@@ -245,5 +267,6 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "choose": choose,
     "reactions": reactions,
     "costs": costs,
+    "pairs": pairs,
     "real": real,
 }

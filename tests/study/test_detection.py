@@ -4,6 +4,7 @@ import itertools
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lalliance_study.detection import plan, tables
@@ -13,6 +14,7 @@ from lalliance_study.detection.law import (
     Timing,
     detected_within,
     detection_quantile,
+    dispersion,
     needed_windows,
     suspicions,
 )
@@ -64,6 +66,19 @@ def test_the_law_in_numbers() -> None:
     assert detected_within(0.0, Loss(0.5), Timing(0.6)) == pytest.approx(0.5**3 * (0.75 + 0.25 * 0.5), rel=0.02)
     assert detected_within(0.701, Loss(0.5), Timing(0.6)) == pytest.approx(1.0)
     assert needed_windows(Loss(0.1), 5.0, 10.0) == 4
+
+
+@pytest.mark.parametrize("loss", [Loss(0.5), Loss(0.3, 4.0)], ids=lambda loss: loss.kind)
+def test_suspicions_scatter_as_much_as_the_law_says(loss: Loss) -> None:
+    """Counted in many long rows of messages, drawn side by side."""
+    chance, rows, length, count = np.random.default_rng(1), 4000, 500, 2
+    rule = loss.rule()
+    enter, stay = (rule, rule) if isinstance(rule, float) else (rule["enter"], 1 - rule["leave"])
+    lost = [chance.random(rows) < loss.share]
+    for _ in range(length):
+        lost.append(chance.random(rows) < np.where(lost[-1], stay, enter))
+    found = sum((~lost[at] & lost[at + 1] & lost[at + 2]).astype(int) for at in range(length - 1))
+    assert np.var(found) / np.mean(found) == pytest.approx(dispersion(loss, Timing(count / 5.0)), rel=0.1)
 
 
 @pytest.mark.parametrize("loss", [Loss(0.5), Loss(0.3, 5.0)], ids=lambda loss: loss.kind)
