@@ -82,7 +82,7 @@ def campaign(
 def _examine_many(seed: int, missions: int, jobs: int | None) -> "tuple[Result, bool]":
     """What came of the missions 0 to `missions` - 1, and whether Ctrl-C ended it early."""
     from lalliance_study.campaign import Result, examine
-    from mission_control.pool import at_once, progress
+    from lalliance_study.pool import at_once, progress
 
     total = Result()
     parts = ((seed, range(first, min(first + PART, missions))) for first in range(0, missions, PART))

@@ -328,7 +328,7 @@ def _follow(parent: int | None) -> None:
     """What a single process does first: log to standard error, and end with its parent if it has one."""
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s", stream=sys.stderr)
     if parent is not None:
-        from mission_control.processes import end_with_parent
+        from lalliance_agents.lineage import end_with_parent
 
         end_with_parent(parent)
 

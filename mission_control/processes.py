@@ -7,7 +7,6 @@ whatever the parent died of.
 
 import asyncio
 import contextlib
-import ctypes
 import itertools
 import os
 import signal
@@ -20,8 +19,6 @@ GRACE = 1.0
 #: Longest line read from a child, in bytes.
 LONGEST_LINE = 2**22
 
-_PR_SET_PDEATHSIG = 1
-
 #: Lines read from a child in one turn of the event loop: a chatty child must not starve the rest.
 LINES_PER_TURN = 20
 
@@ -33,14 +30,6 @@ def _signal_name(number: int) -> str:
         return signal.Signals(number).name
     except ValueError:
         return f"signal {number}"
-
-
-def end_with_parent(parent: int) -> None:
-    """Have this process killed when its parent `parent` ends; ends it at once if that is gone already."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)
 
 
 class Child:

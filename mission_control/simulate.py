@@ -58,8 +58,8 @@ def _once(mission: "Mission", console: "Console", *, events: bool, as_json: bool
 
 
 def _often(mission: "Mission", runs: int, jobs: int | None, console: "Console") -> Mapping[str, Any]:
+    from lalliance_study.pool import at_once, progress
     from lalliance_study.runs import overview, simulate_seeds
-    from mission_control.pool import at_once, progress
 
     parts = [
         range(first, min(first + PART, mission.seed + runs)) for first in range(mission.seed, mission.seed + runs, PART)

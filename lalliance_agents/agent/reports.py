@@ -5,6 +5,7 @@ from collections import Counter
 from lalliance_agents.agent import translate
 from lalliance_agents.bus.faulty import FaultyBus
 from lalliance_agents.bus.messenger import Messenger
+from lalliance_agents.model.hearing import Presence
 from lalliance_agents.model.mind import Mind
 from lalliance_agents.wire.keys import Kind
 from lalliance_agents.wire.messages import Reception
@@ -47,7 +48,8 @@ class Reports:
             received=self._messenger.received,
             dropped=dict(self._messenger.dropped + self._bus.dropped),
             teammates={
-                robot: Reception(received=count, silence=silences.get(robot)) for robot, count in self._received.items()
+                robot: _reception(count, mind.hearing.presences.get(robot), silences.get(robot), now)
+                for robot, count in self._received.items()
             },
             effects=self._bus.effects(),
             ticks=self._ticks,
@@ -59,3 +61,10 @@ class Reports:
         """The packed message with all motivations and their factors."""
         sets = {task: translate.scalars(factors) for task, factors in mind.factors().items()}
         return self._messenger.compose(Kind.MOTIVATION, active=mind.active, sets=sets)
+
+
+def _reception(received: int, presence: Presence | None, silence: float | None, now: float) -> Reception:
+    """What came from one teammate, and whether it was found silent, if it was heard in this trial."""
+    lapses = presence.lapses if presence is not None else 0
+    lost_for = max(now - presence.lapsed_at, 0.0) if presence is not None and presence.absent else None
+    return Reception(received=received, silence=silence, lapses=lapses, lost_for=lost_for)

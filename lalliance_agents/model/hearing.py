@@ -48,6 +48,10 @@ class Presence:
     """The contact that its latest message belongs to; None if it was idle, or said nothing sensible."""
     absent: bool = False
     """Whether a step has found it silent for tau since it was last heard."""
+    lapses: int = 0
+    """How often that has happened in this trial."""
+    lapsed_at: float = -math.inf
+    """When it happened last."""
 
 
 class Hearing:
@@ -183,7 +187,10 @@ class Hearing:
             return
         self._present = None
         for robot, presence in self.presences.items():
-            presence.absent = not self.is_present(robot, now)
+            was_absent, presence.absent = presence.absent, not self.is_present(robot, now)
+            if presence.absent and not was_absent:
+                presence.lapses += 1
+                presence.lapsed_at = now
         for contact in self._lasting:
             if not self.is_on(contact, now):
                 contact.lapsed_at = now

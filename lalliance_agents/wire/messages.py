@@ -18,8 +18,8 @@ from lalliance_agents.wire.keys import NAME_PATTERN, SENDER_PATTERN, Key, Kind
 
 VERSION: Literal[1] = 1
 
-#: Larger messages are dropped unread, in bytes: room for the status of a mission with a thousand tasks.
-MAX_PAYLOAD = 128 * 1024
+#: Larger messages are dropped unread, in bytes: room for the report on a thousand teammates.
+MAX_PAYLOAD = 160 * 1024
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Sender = Annotated[str, Field(pattern=SENDER_PATTERN)]
@@ -133,6 +133,10 @@ class Reception(BaseModel):
     received: Count
     silence: Seconds | None = None
     """Time since the last message, in seconds."""
+    lapses: Count = 0
+    """How often the teammate was found silent for tau in this trial."""
+    lost_for: Seconds | None = None
+    """How long ago that was noticed, in seconds; None while the teammate is heard."""
 
 
 class Effect(BaseModel):

@@ -94,7 +94,7 @@ def test_the_largest_report_fits_into_a_message() -> None:
         sent=2**63 - 1,
         received=2**63 - 1,
         dropped={f"{number:020}": 2**63 - 1 for number in range(20)},
-        teammates={name: Reception(received=2**32, silence=1.5) for name in names},
+        teammates={name: Reception(received=2**32, silence=1.5, lapses=2**16, lost_for=1.5) for name in names},
         effects=[Effect(fault=f"{number:020}", sender="@others", count=2**32) for number in range(MOST_EFFECTS)]
         + [Effect(fault=f"{number:020}", sender=names[0], count=2**32) for number in range(MOST_EFFECTS)],
         ticks=2**63 - 1,

@@ -12,8 +12,8 @@ from lalliance_agents.config import Mission
 from lalliance_agents.errors import LallianceError
 from lalliance_agents.mission_file import load_mission
 from lalliance_study.invariants import Violation
+from lalliance_study.pool import at_once
 from mission_control.campaign_command import campaign
-from mission_control.pool import at_once
 
 
 @pytest.fixture(autouse=True)

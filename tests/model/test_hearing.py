@@ -91,6 +91,18 @@ def test_a_robot_is_present_for_less_than_tau_after_its_last_message(now: float,
     assert ears.robots_present(now) == (["a"] if present else [])
 
 
+def test_each_silence_is_counted_once() -> None:
+    ears = hearing()
+    ears.heard("a", 3.0)
+    for now in (3.5, 4.0, 4.5):
+        ears.note_lapses(now)
+    assert (ears.presences["a"].lapses, ears.presences["a"].lapsed_at) == (1, 4.0)
+    ears.heard("a", 5.0)
+    for now in (5.1, 6.2):
+        ears.note_lapses(now)
+    assert (ears.presences["a"].lapses, ears.presences["a"].lapsed_at) == (2, 6.2)
+
+
 def test_a_robot_never_heard_is_absent() -> None:
     assert not hearing().is_present("a", 0.0)
     assert hearing().silences(1.0) == {}

@@ -11,8 +11,8 @@ from lalliance_study import campaign
 from lalliance_study.campaign import Failure, Result, check_fully, examine, is_repeatable, skips_nothing, try_mission
 from lalliance_study.evidence import Evidence, gather
 from lalliance_study.invariants import Violation
+from lalliance_study.pool import at_once
 from lalliance_study.random_missions import draw_mission
-from mission_control.pool import at_once
 
 FAILING = "lalliance_study.campaign.gather"
 

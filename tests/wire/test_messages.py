@@ -25,7 +25,13 @@ SCALARS = st.dictionaries(
     st.text(max_size=8), st.none() | st.booleans() | FLOATS | st.integers(-(2**63), 2**63 - 1) | st.text(max_size=8),
     max_size=4,
 )  # fmt: skip
-RECEPTIONS = st.builds(messages.Reception, received=COUNTS, silence=st.none() | SECONDS)
+RECEPTIONS = st.builds(
+    messages.Reception,
+    received=COUNTS,
+    silence=st.none() | SECONDS,
+    lapses=COUNTS,
+    lost_for=st.none() | SECONDS,
+)
 STAGES = st.sampled_from(["waiting", "running", "complete", "failed"])
 LEARNING = st.sampled_from(["active", "adaptive"])
 

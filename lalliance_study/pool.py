@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from lalliance_agents.errors import LallianceError
-from mission_control.processes import end_with_parent
+from lalliance_agents.lineage import end_with_parent
 
 #: Parts that wait for each process.
 AHEAD = 3
