@@ -64,15 +64,17 @@ class AirLink:
         self._announce_news = announce_news
         self._every_step = every_step
         self._content: object = None
+        self._task: str | None = None
         self._latest = 0.0
         self._incarnation = self._seq = -1
 
     def __repr__(self) -> str:
         return f"<link {self.sender} -> {self.hearer}, {len(self.waiting)} waiting>"
 
-    def forget(self) -> None:
-        """Whatever comes next is news: the hearer has changed its mind, not the speaker."""
-        self._content = None
+    def forget(self, task: str | None = None) -> None:
+        """Whatever comes next is news, if it is about `task`: the hearer has changed its mind, not the speaker."""
+        if task is None or task == self._task:
+            self._content = None
 
     def reset(self) -> None:
         """The hearer begins a new life, which has heard nothing."""
@@ -108,7 +110,7 @@ class AirLink:
             self._latest = arrives
             self.waiting.append(spoken)
             return
-        self._content = spoken.content
+        self._content, self._task = spoken.content, spoken.heard.task
         if gap >= 0.0:
             self._latest = arrives
             self.waiting.append(spoken)

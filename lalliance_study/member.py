@@ -217,7 +217,7 @@ class Member:
                 self._sensed(now, self.name, task, *felt)
             self.mind.handle(translate.sensed(task, *felt), now)
             for link in self.hears:
-                link.forget()
+                link.forget(task)
             self._wake(now)
 
     def news(self, now: float) -> None:
