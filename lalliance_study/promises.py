@@ -34,6 +34,7 @@ from lalliance_agents.faults import (
     robot_of,
 )
 from lalliance_agents.model.parameters import Architecture, Erratum, Learning, Ordering, Parameters
+from world_server.environments.box_pushing import BoxPushing
 
 #: A robot slowed for good by more than this is as good as stuck.
 AS_GOOD_AS_STUCK = 20.0
@@ -218,11 +219,20 @@ class _Effort:
             rounds = 2 * len(self._mission.tasks) * len(self._mission.robots)
             return rounds * (4 * self._need + pause)
         if not self._restarts:
-            return 2 * self._need + (math.ceil(self._need / shortest) + 1) * pause
+            return 2 * self._need + (math.ceil(self._need / shortest) + 1 + self._turns()) * pause
         growth = min(_growth(self._mission.parameters_of(robot)) for robot in self._able)
         growth = max(growth, LEAST_GROWTH)  # by hand nothing grows, and the first attempt is long enough
         attempts = math.ceil(max(math.log(self._need / shortest) / math.log(growth), 0.0)) + 2
         return len(self._able) * attempts * (2 * growth * self._need + pause)
+
+    def _turns(self) -> int:
+        """How often a lone robot must leave the task because it does not apply just now: at a box, to push its other end.
+
+        Each of its pushes carries an end by at least half the slack (`box_pushing`).
+        """
+        if self._mission.environment.kind != "box_pushing":
+            return 0
+        return math.ceil(2 / BoxPushing.Options.model_validate(self._mission.environment.options).slack)
 
     def _shortest_attempt(self, robot: str) -> float:
         """Psi and lambda are no shorter than this, in seconds."""
