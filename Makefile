@@ -11,7 +11,7 @@ SIDE_BY_SIDE := tests/agent tests/model tests/study tests/wire tests/world tests
 $(SETUP): pyproject.toml constraints.txt
 	@echo "Setting up .venv: this takes about a minute, and a package index"
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,study]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	touch $@
 
 demo: $(SETUP)  ## a team of robot processes finishes a mission although one of them is killed
