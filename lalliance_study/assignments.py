@@ -2,7 +2,7 @@
 
 All work on plain arrays. `times[robots, tasks]` holds the seconds a robot needs for a task, infinite where it cannot do it;
 `ready[robots]` the instants from which robots are free, in seconds; an assignment holds for each task the index of its
-robot. Nothing here is random, and ties go to the lower index.
+robot. Ties go to the lower index, and the same arguments give the same assignment.
 """
 
 import math
@@ -19,6 +19,8 @@ Owners = NDArray[np.intp]
 
 #: Tasks of two robots that are dealt out anew at once; 2 to the power of this many ways are compared.
 MOST_DEALT = 12
+#: Tasks that one kick throws, besides one of the busiest robot.
+THROWN = 3
 #: Share by which a load must fall to count as better, so that rounding cannot make a step go on for ever.
 BETTER = 1e-12
 
@@ -92,6 +94,40 @@ def rebalance(times: Floats, ready: Floats, owner: Owners) -> Owners:
     owner = owner.copy()
     while _relieve(times, ready, owner):
         pass
+    return owner
+
+
+def kick(times: Floats, ready: Floats, owner: Owners, kicks: int, seed: int = 0) -> Owners:
+    """An assignment that is at least as good: again and again some tasks are thrown to other robots, and loads rebalanced.
+
+    What is not worse is kept. One task of the busiest robot is always among those thrown, and a robot that is fast at a task
+    is likely to catch it.
+
+    Args:
+        times: `[robots, tasks]` in seconds; each task has a finite one.
+        ready: `[robots]` in seconds.
+        owner: where to start.
+        kicks: how often.
+        seed: of what is thrown where.
+    """
+    chance = np.random.default_rng(seed)
+    robots, tasks = times.shape
+    catches = (times.min(axis=0) / times) ** 3
+    catches /= catches.sum(axis=0)
+    best = makespan_of(times, ready, owner)
+    for _ in range(kicks):
+        tried = owner.copy()
+        burden = np.flatnonzero(owner == loads_of(times, ready, owner).argmax())
+        thrown = [
+            *chance.choice(tasks, min(THROWN, tasks), replace=False),
+            *burden[chance.permutation(len(burden))[:1]],
+        ]
+        for task in thrown:
+            tried[task] = chance.choice(robots, p=catches[:, task])
+        tried = rebalance(times, ready, tried)
+        makespan = makespan_of(times, ready, tried)
+        if makespan <= best:
+            owner, best = tried, makespan
     return owner
 
 

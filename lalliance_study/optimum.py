@@ -35,6 +35,7 @@ from lalliance_study.assignments import (
     Floats,
     Owners,
     check_times,
+    kick,
     loads_of,
     longest_first,
     makespan_of,
@@ -50,6 +51,13 @@ TOLERANCE = 1e-6
 LEAST_TOLERANCE = 1e-9
 #: Longest search for one optimum, in seconds.
 TIME_LIMIT = 60.0
+#: What a first search may take, in CP-SAT's deterministic seconds; most problems need no more. Only for others it pays to look
+#: for a better assignment by other means first.
+FIRST_SEARCH = 0.2
+#: How many kicks are given to an assignment then; they take a quarter of a second at 20 robots and 40 tasks.
+KICKS = 300
+#: The k for which a robot is told how many tasks of more than a k-th of its time it can do.
+PARTS = (2, 3, 4, 5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,68 +124,95 @@ def optimum(
     free_at = np.zeros(len(table)) if ready is None else np.asarray(ready, dtype=np.float64)
     if free_at.shape != (len(table),) or not (np.isfinite(free_at) & (free_at >= 0)).all():
         raise UserError(f"ready is {free_at}; expected an instant of at least 0 for each of {len(table)} robots")
-    owner = rebalance(table, free_at, to_the_earliest(table, free_at, longest_first(table)))
-    makespan = makespan_of(table, free_at, owner)
-    lower = bounds.slowest_of_the_fastest(table, free_at)
-    if makespan - lower > tolerance * makespan:
-        lower = bounds.one_robot_each(table, free_at, makespan)
-    if makespan - lower > tolerance * makespan:
-        owner, lower = _search(table, free_at, owner, lower, tolerance, (time_limit, work_limit))
-        makespan = makespan_of(table, free_at, owner)
-    return Optimum(makespan, min(lower, makespan), tolerance, perf_counter() - began, tuple(map(int, owner)))
+    state = _State(table, free_at, tolerance)
+    state.bound()
+    if not state.settled:
+        state.search(time_limit, min(work_limit, FIRST_SEARCH))
+    time_left = time_limit - (perf_counter() - began)
+    if not state.settled and time_left > 0 and work_limit > FIRST_SEARCH:
+        state.take(kick(table, free_at, state.owner, KICKS))
+        state.search(time_left, work_limit - FIRST_SEARCH)
+    lower = min(state.lower, state.makespan)
+    return Optimum(state.makespan, lower, tolerance, perf_counter() - began, tuple(map(int, state.owner)))
 
 
-def _search(
-    times: Floats, ready: Floats, owner: Owners, lower: float, tolerance: float, limits: tuple[float, float]
-) -> tuple[Owners, float]:
-    """A best assignment and a lower bound by CP-SAT, from an assignment and a bound.
+class _State:
+    """What is known of a problem: an assignment with its makespan, and a lower bound."""
 
-    CP-SAT counts in whole units. All times are rounded down to them, so that a makespan in units is never above the true one
-    and its bound holds for the true times; it is below by at most one unit for each task, `tolerance`/2 for all. A unit is
-    a power of two, so that the floats here round nothing.
-    """
-    best = makespan_of(times, ready, owner)
-    unit = 2.0 ** math.floor(math.log2(tolerance * best / (2 * times.shape[1] + 2)))
-    model, chosen = _model(np.floor(times / unit), np.floor(ready / unit), owner, (lower // unit, best // unit))
-    cp_model = study_package("ortools.sat.python.cp_model")
-    solver = cp_model.CpSolver()
-    solver.parameters.num_workers = 1
-    solver.parameters.random_seed = 0
-    solver.parameters.relative_gap_limit = 0.4 * tolerance
-    solver.parameters.max_time_in_seconds, solver.parameters.max_deterministic_time = limits
-    status = solver.solve(model)
-    if status not in {cp_model.OPTIMAL, cp_model.FEASIBLE, cp_model.UNKNOWN}:
-        raise RuntimeError(f"CP-SAT finds no assignment although there is one: {solver.status_name(status)}")
-    lower = max(lower, math.floor(solver.best_objective_bound) * unit)
-    if status != cp_model.UNKNOWN:
-        found = owner.copy()
-        for (robot, task), variable in chosen.items():
-            if solver.boolean_value(variable):
-                found[task] = robot
-        found = rebalance(times, ready, found)
-        if makespan_of(times, ready, found) < best:
-            owner = found
-    return owner, lower
+    def __init__(self, times: Floats, ready: Floats, tolerance: float) -> None:
+        self._times, self._ready, self._tolerance = times, ready, tolerance
+        self.owner = rebalance(times, ready, to_the_earliest(times, ready, longest_first(times)))
+        self.makespan = makespan_of(times, ready, self.owner)
+        self.lower = bounds.slowest_of_the_fastest(times, ready)
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is left to be proven."""
+        return self.makespan - self.lower <= self._tolerance * self.makespan
+
+    def take(self, owner: Owners) -> None:
+        """Keep an assignment if it is better."""
+        makespan = makespan_of(self._times, self._ready, owner)
+        if makespan < self.makespan:
+            self.owner, self.makespan = owner, makespan
+
+    def bound(self) -> None:
+        """Prove what linear programmes can, if that is needed."""
+        if not self.settled:
+            self.lower = bounds.one_robot_each(self._times, self._ready, self.makespan)
+
+    def search(self, time_limit: float, work_limit: float) -> None:
+        """Let CP-SAT look for a better assignment and a better bound.
+
+        It counts in whole units. All times are rounded down to them, so that a makespan in units is never above the true one
+        and its bound holds for the true times; it is below by at most one unit for each task, `tolerance`/2 for all. A unit
+        is a power of two, so that the floats here round nothing.
+        """
+        cp_model = study_package("ortools.sat.python.cp_model")
+        unit = 2.0 ** math.floor(math.log2(self._tolerance * self.makespan / (2 * self._times.shape[1] + 2)))
+        within = (int(self.lower // unit), int(self.makespan // unit))
+        model, chosen = _model(np.floor(self._times / unit), np.floor(self._ready / unit), self.owner, within)
+        solver = cp_model.CpSolver()
+        solver.parameters.num_workers = 1
+        solver.parameters.random_seed = 0
+        solver.parameters.relative_gap_limit = 0.4 * self._tolerance
+        solver.parameters.max_time_in_seconds = time_limit
+        solver.parameters.max_deterministic_time = work_limit
+        status = solver.solve(model)
+        if status not in {cp_model.OPTIMAL, cp_model.FEASIBLE, cp_model.UNKNOWN}:
+            raise RuntimeError(f"CP-SAT finds no assignment although there is one: {solver.status_name(status)}")
+        self.lower = max(self.lower, math.floor(solver.best_objective_bound) * unit)
+        if status != cp_model.UNKNOWN:
+            found = self.owner.copy()
+            for (robot, task), variable in chosen.items():
+                if solver.boolean_value(variable):
+                    found[task] = robot
+            self.take(rebalance(self._times, self._ready, found))
 
 
 def _model(
-    times: Floats, ready: Floats, owner: Owners, within: tuple[float, float]
+    times: Floats, ready: Floats, owner: Owners, within: tuple[int, int]
 ) -> tuple[Any, dict[tuple[int, int], Any]]:
-    """The problem for CP-SAT, in whole units, with an assignment as a hint; and its variables by robot and task."""
+    """The problem for CP-SAT, in whole units, with an assignment as a hint; and its variables by robot and task.
+
+    Of tasks that take a robot more than a k-th of the time that it has, it can do k - 1; that follows, and helps the solver.
+    """
     cp_model = study_package("ortools.sat.python.cp_model")
     model = cp_model.CpModel()
-    least, most = map(int, within)
-    makespan = model.new_int_var(least, most, "makespan")
+    makespan = model.new_int_var(*within, "makespan")
     chosen = {
         (int(robot), int(task)): model.new_bool_var(f"{robot} does {task}")
-        for robot, task in np.argwhere(ready[:, None] + times <= most)
+        for robot, task in np.argwhere(ready[:, None] + times <= within[1])
     }
     for task in range(times.shape[1]):
         model.add_exactly_one(chosen[pair] for pair in chosen if pair[1] == task)
     for robot, begins in enumerate(ready):
-        own = [pair for pair in chosen if pair[0] == robot]
-        spent = sum(int(times[pair]) * chosen[pair] for pair in own)
-        model.add(int(begins) + spent <= makespan)
+        own = {variable: int(times[pair]) for pair, variable in chosen.items() if pair[0] == robot}
+        model.add(int(begins) + sum(time * variable for variable, time in own.items()) <= makespan)
+        for parts in PARTS:
+            large = [variable for variable, time in own.items() if time * parts > within[1] - int(begins)]
+            if len(large) >= parts:
+                model.add(sum(large) < parts)
     for pair, variable in chosen.items():
         model.add_hint(variable, owner[pair[1]] == pair[0])
     model.add_hint(makespan, int(loads_of(times, ready, owner).max()))

@@ -14,6 +14,7 @@ from lalliance_study import bounds
 from lalliance_study.assignments import (
     Floats,
     UnreachableTaskError,
+    kick,
     longest_first,
     makespan_of,
     rebalance,
@@ -92,6 +93,28 @@ def test_a_search_that_ends_early_still_encloses_the_optimum(work_limit: float) 
     holds(times, early)
     again = optimum(times, work_limit=work_limit)
     assert (early.makespan, early.lower, early.assignment) == (again.makespan, again.lower, again.assignment)
+
+
+def test_a_hard_problem_is_searched_twice_and_stays_repeatable() -> None:
+    """Equal times and four robots for each task are the hardest: little work proves nothing."""
+    times = drawn(2, 15, 30, 4, 0.0)
+    first, second = (optimum(times, work_limit=limit) for limit in (0.2, 0.6))
+    assert not second.proven
+    assert first.lower <= second.lower <= second.makespan <= first.makespan
+    holds(times, second)
+    again = optimum(times, work_limit=0.6)
+    assert (second.makespan, second.lower, second.assignment) == (again.makespan, again.lower, again.assignment)
+
+
+@settings(max_examples=30, deadline=None)
+@given(tables(robots=4, tasks=6))
+def test_kicks_never_make_it_worse_and_are_repeatable(times: Floats) -> None:
+    ready = np.zeros(len(times))
+    owner = to_the_earliest(times, ready, range(times.shape[1]))
+    kicked = kick(times, ready, owner, 20)
+    assert best_of_all(times) <= makespan_of(times, ready, kicked) * EXACT
+    assert makespan_of(times, ready, kicked) <= makespan_of(times, ready, owner)
+    assert (kick(times, ready, owner, 20) == kicked).all()
 
 
 def test_without_time_nothing_is_proven_but_the_bounds() -> None:
