@@ -283,9 +283,14 @@ class Mission(Record):
         mean = sum(times) / len(times)
         delay = self.parameters.max_delay
         if self.parameters.architecture is Architecture.L_ALLIANCE and delay > 0.05 * mean:
+            value = (
+                f"{delay:g} s"
+                if "max_delay" in self.parameters.model_fields_set
+                else f"not given; the default of {delay:g} s"
+            )
             found.append(
-                f"parameters.max_delay: {delay:g} s is {delay / mean:.0%} of the mean task time ({mean:.3g} s); "
-                f"above 5 % robots spend a noticeable part of the mission waiting; expected about {0.04 * mean:.1g} s"
+                f"parameters.max_delay: {value} is {delay / mean:.0%} of the mean task time ({mean:.3g} s); above 5 % robots "
+                f"spend a noticeable part of the mission waiting; {0.04 * mean:.1g} s is about right"
             )
         for task in self.tasks:
             fastest = min(self.robots[robot].tasks[task] for robot in self.able(task))

@@ -18,7 +18,7 @@ from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
-from lalliance_agents.errors import BusError
+from lalliance_agents.errors import BusError, UserError
 from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message, Status
 from mission_control.keeper import Keeper, LaunchError, View
@@ -145,6 +145,8 @@ class Launcher:
         self._orders.may_return |= plan.beginning.may_return
         self._tasks: set[asyncio.Task[None]] = set()
         self._robot_ended = asyncio.Event()
+        #: What a robot could not use of what it was given, if any could not.
+        self._refusal: asyncio.Future[str] = asyncio.get_running_loop().create_future()
 
     async def run(self) -> dict[str, Any]:
         """Run the mission to its end; its summary.
@@ -152,7 +154,7 @@ class Launcher:
         Raises:
             BusError: no router could be started or reached.
             LaunchError: the mission could not be brought to its end.
-            UserError: the world server was given something that it cannot use.
+            UserError: the world server or a robot was given something that it cannot use.
         """
         try:
             if self._plan.connect is None:
@@ -220,6 +222,8 @@ class Launcher:
 
     async def _observe(self, child: Child) -> None:
         code = await child.wait()
+        if code == 2 and not self._refusal.done():
+            self._refusal.set_result(f"robot {child.name}: {child.last_line.removeprefix('lalliance: ')}")
         if code not in {0, 1}:
             self._view.say(f"robot {child.name} ended: {child.status}")
         self._robot_ended.set()
@@ -253,17 +257,20 @@ class Launcher:
             await child.read_line()
 
     async def _await_end(self) -> dict[str, Any]:
-        """The summary of the world server, or an error as soon as nobody is left to complete the mission."""
+        """The summary of the world server, or an error as soon as nobody is left to complete the mission, or one cannot."""
         ending = asyncio.create_task(self._world.summary())
         deserted = asyncio.create_task(self._await_desertion())
         try:
             while not ending.done():
-                await asyncio.wait({ending, deserted}, return_when=asyncio.FIRST_COMPLETED)
+                ends: set[asyncio.Future[Any]] = {ending, deserted, self._refusal}
+                await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+                if self._refusal.done() and not ending.done():
+                    raise UserError(self._refusal.result())
                 if not ending.done():
                     await asyncio.wait({ending}, timeout=LAST_CHANCE)
                 if not ending.done() and self._is_deserted():
-                    ends = ", ".join(f"{name}: {child.status}" for name, child in self._robots.items())
-                    raise LaunchError(f"no robot is left to complete the mission ({ends})")
+                    told = ", ".join(f"{name}: {child.status}" for name, child in self._robots.items())
+                    raise LaunchError(f"no robot is left to complete the mission ({told})")
                 if deserted.done():  # and a robot has come back since
                     deserted = asyncio.create_task(self._await_desertion())
             return ending.result()

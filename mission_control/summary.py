@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 from rich.console import Console, Group, RenderableType
@@ -43,7 +44,7 @@ def _tasks(tasks: Mapping[str, Any]) -> Table:
     table.add_column("attempts")
     for name, task in tasks.items():
         done = "open" if task["completed_at"] is None else f"{task['completed_at']:.1f} s"
-        attempts = ", ".join(map(_attempt, task["attempts"]))
+        attempts = ", ".join(_attempts(task["attempts"]))
         table.add_row(name, done, " + ".join(task["by"]), attempts)
     return table
 
@@ -58,9 +59,13 @@ _ENDS = {
 }
 
 
-def _attempt(attempt: Mapping[str, Any]) -> str:
-    ended = _ENDS.get(attempt["ended"] or "")
-    return f"{attempt['robot']} from {attempt['at']:.1f} s" + (f" ({ended})" if ended else "")
+def _attempts(attempts: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Attempts in words; those of one robot that follow one another and end alike, in one."""
+    for (robot, end), same in groupby(attempts, lambda one: (one["robot"], _ENDS.get(one["ended"] or ""))):
+        instants = [f"{one['at']:.1f} s" for one in same]
+        often = f"{robot} {len(instants)} times, from {instants[0]} to {instants[-1]}"
+        told = f"{robot} from {', '.join(instants)}" if len(instants) < 4 else often
+        yield f"{told} ({end})" if end else told
 
 
 def _takeovers(takeovers: list[dict[str, Any]]) -> Table:
@@ -116,7 +121,7 @@ def _effect(fault: Mapping[str, Any]) -> str:
     if fault["kind"] not in _COUNTED:
         return f"fired at {fault['fired_at']:.1f} s"
     messages = f"{fault['count']} message{'' if fault['count'] == 1 else 's'}"
-    return f"fired, {messages}, first at {fault['fired_at']:.1f} s"
+    return f"fired, {messages}, first reported at {fault['fired_at']:.1f} s"
 
 
 _STYLES = {"waiting": "dim", "on": "red", "over": ""}
@@ -132,9 +137,9 @@ def faults_table(faults: Sequence[Mapping[str, Any]]) -> Table:
     for column in ("state", "effect"):
         table.add_column(column)
     for fault in faults:
-        until = "healed" if fault["until"] is None else f"{fault['until']:.1f} s"
+        until = "for good" if fault["until"] is None else f"{fault['until']:.1f} s"
         state = Text(fault["state"], style=_STYLES.get(fault["state"], ""))
-        effect = _effect(fault) or ("" if fault["state"] == "waiting" else "none so far")
+        effect = _effect(fault) or {"waiting": "", "on": "none reported yet", "over": "never fired"}[fault["state"]]
         table.add_row(fault["name"], Text(fault["text"]), f"{fault['at']:.1f} s", until, state, effect)
     return table
 

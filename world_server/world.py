@@ -166,7 +166,8 @@ class World:
         else:
             body.task = None
             self.ledger.failed(robot, self.elapsed)
-            self._report("gone", f"{robot} is gone", robot=robot)
+            hangs = self.live and self.failures.is_hung(robot)
+            self._report("gone", f"{robot} {'does not answer' if hangs else 'is gone'}", robot=robot)
             self._rest()
 
     def act(self, action: Action, now: float) -> None:

@@ -30,6 +30,7 @@ class Performer:
         self._on_return = on_return
         self._running: dict[str, asyncio.Task[None]] = {}
         self._ending: set[asyncio.Task[None]] = set()
+        self._told: set[tuple[str, type[BaseException]]] = set()
         # Not waited for any more, but kept: the event loop does not hold on to tasks.
         self._left_behind: set[asyncio.Task[None]] = set()
 
@@ -61,20 +62,29 @@ class Performer:
         await self._let_end(before)
         try:
             await one.perform()
-        except (Exception, SystemExit):
-            _log.exception("%s failed", described(one))
+        except (Exception, SystemExit) as error:
+            self._tell(one, error)
             if not _is_stopped():
                 self._on_failure(one)
-        except asyncio.CancelledError:
+        except asyncio.CancelledError as error:
             if _is_stopped():
                 raise
             # Nobody stopped this set: something that it waited for was cancelled.
-            _log.exception("%s failed", described(one))
+            self._tell(one, error)
             self._on_failure(one)
         else:
             if not _is_stopped():
                 one.returned = True
                 self._on_return(one)
+
+    def _tell(self, one: BehaviorSet, error: BaseException) -> None:
+        """Log a failure: where it comes from the first time, and in one line from then on."""
+        kind = one.task, type(error)
+        if kind in self._told:
+            _log.error("%s failed again: %s", described(one), type(error).__name__)
+        else:
+            self._told.add(kind)
+            _log.error("%s failed", described(one), exc_info=error)
 
     async def _let_end(self, before: set[asyncio.Task[None]]) -> None:
         if not before:

@@ -44,8 +44,8 @@ def printed(summary: dict[str, Any]) -> list[str]:
 def test_each_fault_is_told_with_what_it_did_and_what_never_fired_stands_out() -> None:
     lines = [line for line in printed(SUMMARY | {"faults": FAULTS}) if "Fault" in line]
     assert lines == [
-        "Fault: loss 30% from * to pusher: fired, 214 messages, first at 2.1 s",
-        "Fault: mute of lifter: fired, 1 message, first at 5.0 s",
+        "Fault: loss 30% from * to pusher: fired, 214 messages, first reported at 2.1 s",
+        "Fault: mute of lifter: fired, 1 message, first reported at 5.0 s",
         "Fault: crash of lifter: fired at 14.0 s",
         "\x1b[33mFault: stuck of lifter: never fired\x1b[0m",
         "\x1b[33mFault: hang of pusher: never began, it was due at 2.0 s\x1b[0m",
@@ -74,10 +74,10 @@ def test_the_faults_of_a_running_mission_are_a_table() -> None:
     Console(width=100, file=file).print(faults_table(FAULTS))
     assert [line.rstrip() for line in file.getvalue().splitlines()] == [
         "name     fault                      since   until  state    effect",
-        "1-link   loss 30% from * to pusher  2.0 s  20.0 s  over     fired, 214 messages, first at 2.1 s",
-        "2-mute   mute of lifter             2.0 s  20.0 s  on       fired, 1 message, first at 5.0 s",
+        "1-link   loss 30% from * to pusher  2.0 s  20.0 s  over     fired, 214 messages, first reported at 2.1 s",
+        "2-mute   mute of lifter             2.0 s  20.0 s  on       fired, 1 message, first reported at 5.0 s",
         "3-crash  crash of lifter            2.0 s  healed  on       fired at 14.0 s",
-        "4-stuck  stuck of lifter            2.0 s  20.0 s  on       none so far",
+        "4-stuck  stuck of lifter            2.0 s  20.0 s  on       none reported yet",
         "5-hang   hang of pusher             2.0 s  20.0 s  waiting",
     ]
 

@@ -54,7 +54,7 @@ def test_a_robot_that_hangs_longer_than_its_presence_lasts_comes_back_when_it_is
     left = processes.robot("left")
     assert processes.chaos(team, "inject", "kind=hang", "robot=left") == "1-hang: hang of left, until it is healed"
     until(lambda: is_stopped(left))
-    read_until(run, "left is gone")
+    read_until(run, "left does not answer")
     assert processes.chaos(team, "heal", "1-hang") == "healed 1-hang"
     read_until(run, "left is there")
     assert processes.robot("left") == left
