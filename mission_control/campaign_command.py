@@ -204,8 +204,15 @@ def _replay(path: Path, console: "Console", *, as_json: bool) -> int:
 
 def _show(document: dict[str, Any], console: "Console") -> None:
     """The campaign in a few lines, the last of which says it all."""
-    faults = [f"{kind} {one['fired']}/{one['scheduled']}" for kind, one in document["faults"].items()]
-    console.print(f"Faults fired, of those scheduled: {', '.join(faults) or 'none'}")
+    from rich.table import Table
+
+    faults = Table(box=None, pad_edge=False, header_style="bold")
+    faults.add_column("fault")
+    for column in ("scheduled", "fired", "had nothing to strike"):
+        faults.add_column(column, justify="right")
+    for kind, one in document["faults"].items():
+        faults.add_row(kind, str(one["scheduled"]), str(one["fired"]), str(one["scheduled"] - one["fired"]))
+    console.print(faults)
     takeovers = [f"{count} by {cause}" for cause, count in document["takeovers"].items()]
     console.print(f"Takeovers: {', '.join(takeovers) or 'none'}")
     for why, count in document["excused"].items():
@@ -213,6 +220,6 @@ def _show(document: dict[str, Any], console: "Console") -> None:
     console.print(
         f"{document['missions']} missions of seed {document['seed']}, {document['failed']} failed; "
         f"{document['complete']} complete, {sum(document['excused'].values())} incomplete as expected; "
-        f"{document['repeated']} run again, {document['every_step']} with every step; "
+        f"{document['repeated']} repeated and compared, {document['every_step']} with every step made; "
         f"{document['rate']:.1f} missions/s, {document['virtual_hours']:.2f} virtual hours, digest {document['digest']}"
     )

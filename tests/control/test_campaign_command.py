@@ -36,8 +36,8 @@ def test_a_campaign_says_what_it_saw(processes: Processes) -> None:
     done = processes.run("campaign", "--missions", "30", "--seed", "5", "--jobs", "2")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert lines[0].startswith("Faults fired, of those scheduled: ")
-    assert lines[1].startswith("Takeovers: ")
+    assert lines[0].split() == ["fault", "scheduled", "fired", "had", "nothing", "to", "strike"]
+    assert any(line.startswith("Takeovers: ") for line in lines)
     assert lines[-1].startswith("30 missions of seed 5, 0 failed; ")
     assert "missions/s" in lines[-1]
     assert "virtual hours" in lines[-1]
