@@ -71,14 +71,14 @@ def test_a_machine_is_not_called_slow_for_what_a_hang_has_missed() -> None:
 
 def test_the_faults_of_a_running_mission_are_a_table() -> None:
     file = StringIO()
-    Console(width=100, file=file).print(faults_table(FAULTS))
+    Console(width=120, file=file).print(faults_table(FAULTS))
     assert [line.rstrip() for line in file.getvalue().splitlines()] == [
-        "name     fault                      since   until  state    effect",
-        "1-link   loss 30% from * to pusher  2.0 s  20.0 s  over     fired, 214 messages, first reported at 2.1 s",
-        "2-mute   mute of lifter             2.0 s  20.0 s  on       fired, 1 message, first reported at 5.0 s",
-        "3-crash  crash of lifter            2.0 s  healed  on       fired at 14.0 s",
-        "4-stuck  stuck of lifter            2.0 s  20.0 s  on       none reported yet",
-        "5-hang   hang of pusher             2.0 s  20.0 s  waiting",
+        "name     fault                      since     until  state    effect",
+        "1-link   loss 30% from * to pusher  2.0 s    20.0 s  over     fired, 214 messages, first reported at 2.1 s",
+        "2-mute   mute of lifter             2.0 s    20.0 s  on       fired, 1 message, first reported at 5.0 s",
+        "3-crash  crash of lifter            2.0 s  for good  on       fired at 14.0 s",
+        "4-stuck  stuck of lifter            2.0 s    20.0 s  on       none reported yet",
+        "5-hang   hang of pusher             2.0 s    20.0 s  waiting",
     ]
 
 
