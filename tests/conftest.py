@@ -1,6 +1,7 @@
 """Which event loop a test runs in: one with virtual time if it asks for it, else a real one."""
 
 import asyncio
+import signal
 from collections.abc import Callable, Mapping
 
 import pytest
@@ -13,3 +14,9 @@ def pytest_asyncio_loop_factories(
     if item.get_closest_marker("virtual_time"):
         return {"virtual": VirtualTimeLoop}
     return {"real": asyncio.new_event_loop}
+
+
+def pytest_configure() -> None:
+    """Tests send SIGINT to processes, which would ignore it as whoever started pytest in the background had it do."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
