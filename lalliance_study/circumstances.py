@@ -97,6 +97,7 @@ class Mishaps:
 
     def _spring(self, robot: str, number: int, lasts: float, now: float) -> None:
         world, task = self._world, self._world.bodies[robot].task
+        world.advance(now)
         if self._attempts[robot] == number and task is not None and not world.over:
             fault = Stuck(kind="stuck", robot=robot, task=task, at=0.0)
             made = world.inject(fault, None if lasts == math.inf else lasts, now)

@@ -28,6 +28,12 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     return made
 
 
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """The same for a small function that is called all the time, put in the place of each call."""
+    made: Callable[P, R] = numba.njit(nogil=True, error_model="numpy", forceinline=True)(function)
+    return made
+
+
 def in_threads(function: Callable[P, R]) -> Callable[P, R]:
     """The same for a function whose `each` loops are shared out among threads."""
     made: Callable[P, R] = numba.njit(nogil=True, error_model="numpy", parallel=True)(function)
@@ -39,8 +45,9 @@ each: type[range] = numba.prange
 
 
 def set_threads(count: int) -> None:
-    """How many threads `in_threads` may use."""
-    numba.set_num_threads(count)
+    """How many threads `in_threads` may use; the machine may have fewer."""
+    most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+    numba.set_num_threads(min(count, most))
 
 
 for _formula in vars(equations).values():

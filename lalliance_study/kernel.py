@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from lalliance_study.compiled import Memory, compiled, each, in_threads, set_threads
+from lalliance_study.kernel_explore import explore
 from lalliance_study.kernel_hearing import (
     arrive,
     beat_until,
@@ -20,11 +21,10 @@ from lalliance_study.kernel_hearing import (
     hush,
     instant,
     last_beat,
-    next_beat,
     say,
     wake_by,
 )
-from lalliance_study.kernel_hearing import refresh as refresh_time
+from lalliance_study.kernel_load import load, next_trial
 from lalliance_study.kernel_mind import lay_down, take_up, think_active, think_idle
 from lalliance_study.kernel_state import (
     HEAR,
@@ -32,169 +32,16 @@ from lalliance_study.kernel_state import (
     INFINITY,
     LINE,
     NEVER,
-    NOTHING,
     QUEUE,
-    ROBOTS,
-    SAMPLES,
     SENSE,
     TASKS,
+    TRIAL,
     Rules,
     in_memory,
     new_teams,
 )
-from lalliance_study.kernel_world import act, die, leave, look_at, plan, publish, turn
+from lalliance_study.kernel_world import act, die, leave, publish, turn
 from lalliance_study.scenarios import Missions
-
-
-@compiled
-def _clear(w: Memory, n: int, m: int, width: int) -> None:
-    for robot in range(n):
-        w.r_mates[robot] = 0
-        w.r_sets[robot] = 0
-        for other in range(n):
-            w.k_live[robot * ROBOTS + other] = 0
-            w.k_met[robot * ROBOTS + other] = 0
-            w.k_last[robot * ROBOTS + other] = -INFINITY
-            w.k_attempt[robot * ROBOTS + other] = -1
-        for task in range(m):
-            w.place[robot * TASKS + task] = -1
-    for pair in range(m * width * width):
-        w.q_met_on[pair] = 0
-        w.q_trying[pair] = 0
-        w.q_a_left[pair] = INFINITY
-        w.q_time[pair] = math.nan
-        w.q_measured[pair] = 0.0
-        w.q_floor[pair] = 0.0
-        w.q_floor_left[pair] = 0
-        w.q_count[pair] = 0
-
-
-@compiled
-def _load_task(w: Memory, missions: Missions, number: int, task: int) -> None:
-    width, count = w.width, 0
-    for place in range(width):
-        robot = missions.able[number, task, place]
-        if robot < 0:
-            break
-        count += 1
-        at = task * width + place
-        w.p_able[at] = robot
-        w.p_own[at] = missions.own[number, task, place]
-        w.p_draw[at] = missions.draw[number, task, place]
-        w.p_trap_at[at] = missions.trap_at[number, task, place]
-        w.p_trap_lasts[at] = missions.trap_lasts[number, task, place]
-        w.p_base[at] = 0.0
-        w.p_since[at] = w.born
-        w.p_growth[at] = 0.0
-        w.p_complete[at] = 0
-        w.p_earlier[at] = 0
-        w.p_leavers[at] = 0
-        w.place[robot * TASKS + task] = place
-        w.set_task[robot * TASKS + w.r_sets[robot]] = task
-        w.r_sets[robot] += 1
-    w.t_able_count[task] = count
-    w.t_share[task] = 0.0
-    w.t_rate[task] = 0.0
-    w.t_share_at[task] = w.began
-    w.t_ends[task] = INFINITY
-    w.t_closed[task] = 0
-    w.t_published[task] = 0
-
-
-@compiled
-def _load_knowledge(w: Memory, rules: Rules, missions: Missions, number: int, task: int) -> None:
-    """Samples of the width x width pairs of a task: the last mu."""
-    samples = min(missions.known.shape[4], rules.trials)
-    first = missions.known.shape[4] - samples
-    count = w.t_able_count[task]
-    for mine in range(count):
-        hearer = w.p_able[task * w.width + mine]
-        for place in range(count):
-            pair = (task * w.width + mine) * w.width + place
-            for index in range(samples):
-                w.samples[pair * SAMPLES + index] = missions.known[number, task, mine, place, first + index]
-            w.q_count[pair] = samples
-            refresh_time(w, hearer, pair)
-
-
-@compiled
-def _find_mates(w: Memory) -> None:
-    """Who shares a task with whom, in ascending order."""
-    for task in range(w.m):
-        for mine in range(w.t_able_count[task]):
-            for place in range(w.t_able_count[task]):
-                if mine != place:
-                    robot, mate = w.p_able[task * w.width + mine], w.p_able[task * w.width + place]
-                    w.k_met[robot * ROBOTS + mate] = 1
-    for robot in range(w.n):
-        for mate in range(w.n):
-            if w.k_met[robot * ROBOTS + mate]:
-                w.k_met[robot * ROBOTS + mate] = 0
-                w.mate[robot * ROBOTS + w.r_mates[robot]] = mate
-                w.r_mates[robot] += 1
-
-
-@compiled
-def _wake_up(w: Memory, rules: Rules, missions: Missions, number: int, robot: int) -> None:
-    """A robot when the trial begins; it has made a few steps before, waiting."""
-    w.r_first[robot] = missions.phase[number, robot] * rules.step
-    w.r_active[robot] = -1
-    w.r_idle_since[robot] = w.born
-    w.r_contended[robot] = 0
-    w.r_waiting[robot] = rules.beats
-    w.r_dead[robot] = 0
-    w.r_met[robot] = 0
-    w.r_open[robot] = w.r_sets[robot]
-    w.r_settle_at[robot] = INFINITY
-    w.r_stale[robot] = 1
-    w.r_fallback[robot] = rules.initial_task_time
-    w.r_saying[robot] = NOTHING
-    w.r_heard[robot] = NOTHING
-    w.r_flying[robot] = 0
-    w.r_said_since[robot] = 0.0
-    w.r_body[robot] = -1
-    w.r_stuck[robot] = 0
-    w.r_turn[robot] = INFINITY
-    w.r_done[robot] = 0.0
-    w.r_life[robot] = missions.life[number, robot]
-    w.r_dies[robot] = INFINITY
-    w.r_wake[robot] = NEVER
-    w.r_idle_step[robot] = NEVER
-    if w.r_sets[robot] == 0:
-        w.r_dead[robot] = 1
-        return
-    # Its first step of all announces, and then every period.
-    w.r_beat[robot] = -1
-    w.r_due[robot] = 0.0
-    if w.r_first[robot] <= w.born:
-        w.r_beat[robot] = 0
-        w.r_due[robot] = rules.period
-        beat_until(w, rules, robot, w.born)
-    if rules.beats:
-        w.r_idle_step[robot] = next_beat(w, rules, robot) if w.r_beat[robot] >= 0 else 0
-    wake_by(w, rules, robot, w.born)
-
-
-@compiled
-def load(w: Memory, rules: Rules, missions: Missions, number: int) -> None:
-    """Prepare a mission as it stands when all robots have been told that the trial begins."""
-    w.n, w.m, w.width = missions.phase.shape[1], missions.able.shape[1], missions.able.shape[2]
-    w.began = look_at(rules, rules.delay)
-    w.born = w.began + rules.delay
-    w.over = 0
-    w.left = w.m
-    w.last_end = 0.0
-    w.soon_head = w.soon_tail = w.acts_head = w.acts_tail = 0
-    w.sent = w.activations = w.takeovers = w.lines = 0
-    _clear(w, w.n, w.m, w.width)
-    for task in range(w.m):
-        _load_task(w, missions, number, task)
-        _load_knowledge(w, rules, missions, number, task)
-    _find_mates(w)
-    w.now = w.born
-    for robot in range(w.n):
-        _wake_up(w, rules, missions, number, robot)
-    plan(w, rules)
 
 
 @compiled
@@ -218,10 +65,10 @@ def _step(w: Memory, rules: Rules, log: np.ndarray, robot: int, step: int) -> No
                 _note(w, log, robot, w.r_active[robot], cause)
                 lay_down(w, rules, robot, cause, step)
         else:
-            at = think_idle(w, rules, robot, step)
+            at = explore(w, rules, robot, step) if w.exploring else think_idle(w, rules, robot, step)
             if at >= 0:
                 cause = take_up(w, rules, robot, at, step)
-                _note(w, log, robot, at // w.width, cause)
+                _note(w, log, robot, w.p_task[at], cause)
     if step >= w.r_idle_step[robot]:
         w.r_idle_step[robot] = NEVER
         say(w, rules, robot, IDLE, step)
@@ -254,7 +101,7 @@ def _matters(w: Memory, rules: Rules, robot: int) -> bool:
     if task < 0 or w.r_contended[robot] or rules.influence_on_active:
         return True
     at = task * w.width + w.place[robot * TASKS + task]
-    return math.isnan(w.q_time[at * w.width + at % w.width])
+    return math.isnan(w.q_time[at * w.width + w.p_mine[at]])
 
 
 @compiled
@@ -282,19 +129,16 @@ def _happen(w: Memory, rules: Rules) -> None:
         arrive(w, rules, who)
     elif w.soon_kind[slot] == SENSE:
         _sense(w, rules, who)
+    elif w.soon_kind[slot] == TRIAL:
+        next_trial(w, rules)
     else:
         leave(w, rules, who, w.now)
 
 
 @compiled
-def run_one(  # noqa: PLR0912 - all kinds of events meet in this loop
-    w: Memory, rules: Rules, missions: Missions, number: int, log: np.ndarray
-) -> None:
+def run_one(w: Memory, rules: Rules, missions: Missions, number: int, log: np.ndarray) -> None:
     """Run a mission to its end."""
     load(w, rules, missions, number)
-    deadline = look_at(rules, w.began + rules.deadline)
-    if deadline < w.began + rules.deadline:
-        deadline += rules.world_step
     while w.over == 0:
         robot, step_at, step = -1, INFINITY, NEVER
         special, special_at = -1, INFINITY
@@ -308,7 +152,7 @@ def run_one(  # noqa: PLR0912 - all kinds of events meet in this loop
                 special, special_at = one, min(w.r_turn[one], w.r_dies[one])
         soon_at = w.soon_at[w.soon_head % QUEUE] if w.soon_head < w.soon_tail else INFINITY
         act_at = w.acts_at[w.acts_head % QUEUE] if w.acts_head < w.acts_tail else INFINITY
-        world_at = min(w.look, deadline)
+        world_at = min(w.look, w.gives_up_at, w.trial_at)
         earliest = min(soon_at, act_at, world_at, special_at)
         if step_at < earliest:
             w.now = step_at

@@ -11,25 +11,25 @@ import math
 
 from lalliance_agents.model.equations import more_than, task_time
 from lalliance_agents.model.parameters import SLACK
-from lalliance_study.compiled import Memory, compiled
+from lalliance_study.compiled import Memory, compiled, inlined
 from lalliance_study.kernel_state import HEAR, IDLE, INFINITY, NEVER, NOTHING, ROBOTS, SAMPLES, TASKS, Rules
 from lalliance_study.kernel_world import soon
 
 
-@compiled
+@inlined
 def instant(w: Memory, rules: Rules, robot: int, step: int) -> float:
     """When a robot makes a control step."""
     at: float = w.r_first[robot] + step * rules.step
     return at
 
 
-@compiled
+@inlined
 def before(w: Memory, rules: Rules, robot: int, step: int) -> float:
     """When it made the step before; its life begins at 0."""
     return instant(w, rules, robot, step - 1) if step > 0 else 0.0
 
 
-@compiled
+@inlined
 def step_from(w: Memory, rules: Rules, robot: int, at: float) -> int:
     """The first step of a robot that is not before `at`."""
     if at == INFINITY:
@@ -40,11 +40,12 @@ def step_from(w: Memory, rules: Rules, robot: int, at: float) -> int:
     return step
 
 
-@compiled
+@inlined
 def wake_by(w: Memory, rules: Rules, robot: int, at: float) -> None:
     """Have a robot think at its first step that is neither before `at` nor past."""
-    step = step_from(w, rules, robot, max(at, w.now))
-    w.r_wake[robot] = min(w.r_wake[robot], step)
+    at = max(at, w.now)
+    if w.r_wake[robot] == NEVER or instant(w, rules, robot, w.r_wake[robot]) > at:
+        w.r_wake[robot] = min(w.r_wake[robot], step_from(w, rules, robot, at))
 
 
 @compiled
@@ -70,7 +71,7 @@ def beat_until(w: Memory, rules: Rules, robot: int, until: float) -> None:
         step = next_beat(w, rules, robot)
 
 
-@compiled
+@inlined
 def last_beat(w: Memory, rules: Rules, robot: int) -> float:
     """When the latest announcement was made."""
     return instant(w, rules, robot, w.r_beat[robot])
@@ -139,11 +140,11 @@ def fail(w: Memory, rules: Rules, hearer: int, pair: int, failed: bool, short: b
     """Monitor._fail: an attempt ends without completion."""
     w.q_trying[pair] = 0
     if w.q_a_left[pair] < INFINITY:
-        w.p_leavers[pair // w.width] -= 1
+        w.p_leavers[w.q_at[pair]] -= 1
     elapsed = w.q_a_last[pair] - w.q_a_started[pair]
     if short and not more_than(elapsed, rules.collision_window):
         return
-    w.p_earlier[pair // w.width] += 1
+    w.p_earlier[w.q_at[pair]] += 1
     if failed and rules.remembers_failures:
         w.q_floor[pair] = max(w.q_floor[pair], rules.failure_factor * elapsed)
         w.q_floor_left[pair] = rules.trials
@@ -176,7 +177,7 @@ def settle(w: Memory, rules: Rules, hearer: int, at: int, now: float) -> None:
             fail(w, rules, hearer, pair, True, True)
 
 
-@compiled
+@inlined
 def last_step(w: Memory, rules: Rules, robot: int, now: float) -> float:
     """When a robot made its latest step before the event at `now`; minus infinity if it has made none."""
     step = step_from(w, rules, robot, now)
@@ -188,7 +189,8 @@ def completed(w: Memory, rules: Rules, hearer: int, task: int, now: float) -> No
     """Monitor.completed: credit who did the task."""
     mine = w.place[hearer * TASKS + task]
     at = task * w.width + mine
-    settle(w, rules, hearer, at, last_step(w, rules, hearer, now))
+    if w.p_leavers[at] > 0:
+        settle(w, rules, hearer, at, last_step(w, rules, hearer, now))
     lasting, any_attempt, one, one_of_any = 0, 0, -1, -1
     for place in range(w.t_able_count[task]):
         pair = at * w.width + place
@@ -246,12 +248,13 @@ def _elsewhere(w: Memory, rules: Rules, hearer: int, speaker: int, task: int, no
 @compiled
 def _observe(w: Memory, rules: Rules, hearer: int, pair: int, now: float, length: float) -> bool:
     """Monitor.observe: the speaker is on the task since `length` seconds; whether this is a new attempt of it."""
-    settle(w, rules, hearer, pair // w.width, last_step(w, rules, hearer, now))
+    if w.p_leavers[w.q_at[pair]] > 0:
+        settle(w, rules, hearer, w.q_at[pair], last_step(w, rules, hearer, now))
     if w.q_trying[pair]:
         begun_later = more_than(now - length, w.q_a_last[pair] + rules.tau)
         if length >= w.q_a_length[pair] - SLACK and not begun_later:
             if w.q_a_left[pair] < INFINITY:
-                w.p_leavers[pair // w.width] -= 1
+                w.p_leavers[w.q_at[pair]] -= 1
             w.q_a_last[pair] = now
             w.q_a_length[pair] = length
             w.q_a_left[pair] = INFINITY

@@ -8,7 +8,7 @@ import math
 
 from lalliance_agents.model import equations
 from lalliance_agents.model.parameters import SLACK
-from lalliance_study.compiled import Memory, compiled
+from lalliance_study.compiled import Memory, compiled, inlined
 from lalliance_study.kernel_state import INFINITY, ROBOTS, TASKS, Rules
 
 in_window = equations.in_window
@@ -16,10 +16,10 @@ patience = equations.patience
 scale_factor = equations.scale_factor
 
 
-@compiled
+@inlined
 def own_time(w: Memory, robot: int, at: int) -> float:
     """Knowledge.own_time, of the robot at the place `at`."""
-    pair = at * w.width + at % w.width
+    pair = at * w.width + w.p_mine[at]
     known: float = w.q_time[pair]
     return max(w.r_fallback[robot], w.q_floor[pair]) if math.isnan(known) else known
 
@@ -67,19 +67,19 @@ def who_is_present(w: Memory, rules: Rules, robot: int, now: float) -> float:
     return lapse - SLACK
 
 
-@compiled
+@inlined
 def best_time(w: Memory, rules: Rules, at: int, own: float) -> float:
     """Knowledge.best_time, with those who are `present`."""
     best = own if rules.self_counts else INFINITY
-    task = at // w.width
+    task = w.p_task[at]
     for place in range(w.t_able_count[task]):
         time = w.q_time[at * w.width + place]
-        if place != at % w.width and w.present[w.p_able[task * w.width + place]] and time < best:
+        if place != w.p_mine[at] and w.present[w.p_able[task * w.width + place]] and time < best:
             best = time
     return best
 
 
-@compiled
+@inlined
 def phi_of(w: Memory, rules: Rules, pair: int, own: float) -> float:
     """Appraisal._patience: phi with the speaker of `pair`, in seconds."""
     if not rules.learns:
@@ -88,7 +88,7 @@ def phi_of(w: Memory, rules: Rules, pair: int, own: float) -> float:
     return patience(rules.strategy, own, own if math.isnan(theirs) else theirs)
 
 
-@compiled
+@inlined
 def is_on(w: Memory, rules: Rules, pair: int, now: float) -> bool:
     """Hearing.is_on: whether the speaker of `pair` was heard on the task within tau."""
     if w.q_met_on[pair] == 0:
@@ -96,10 +96,10 @@ def is_on(w: Memory, rules: Rules, pair: int, now: float) -> bool:
     return is_live(w, pair) or in_window(w.q_c_last[pair], now - rules.tau, max(now, w.q_c_last[pair]), True)
 
 
-@compiled
+@inlined
 def is_live(w: Memory, pair: int) -> bool:
     """Whether the speaker of `pair` goes on to say that it is on the task."""
-    at = pair // w.width
-    task = at // w.width
-    on: bool = w.r_heard[w.p_able[task * w.width + pair % w.width]] == task
+    at = w.q_at[pair]
+    task = w.p_task[at]
+    on: bool = w.r_heard[w.q_speaker[pair]] == task
     return on

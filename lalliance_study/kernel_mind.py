@@ -9,7 +9,7 @@ import math
 
 from lalliance_agents.model import equations
 from lalliance_agents.model.parameters import EARLY, SLACK
-from lalliance_study.compiled import Memory, compiled
+from lalliance_study.compiled import Memory, compiled, inlined
 from lalliance_study.kernel_hearing import (
     beat_until,
     before,
@@ -86,7 +86,7 @@ def begin(w: Memory, rules: Rules, robot: int, now: float, last: float) -> None:
         w.r_idle_since[robot] = last
 
 
-@compiled
+@inlined
 def fast_of(w: Memory, rules: Rules, robot: int, at: int, category: int, own: float) -> float:
     """Appraisal._fast_rate."""
     if not rules.learns:
@@ -104,13 +104,13 @@ def fast_of(w: Memory, rules: Rules, robot: int, at: int, category: int, own: fl
     return fast_rate(rules.threshold, wait)
 
 
-@compiled
+@inlined
 def contention(w: Memory, rules: Rules, at: int, now: float, last: float) -> tuple[bool, bool, float]:
     """Whether a teammate is on the task of a place, whether one is news, and when the next one lapses."""
     contended, news, lapse = False, False, INFINITY
-    for place in range(w.t_able_count[at // w.width]):
+    for place in range(w.t_able_count[w.p_task[at]]):
         pair = at * w.width + place
-        if place == at % w.width or w.q_met_on[pair] == 0:
+        if place == w.p_mine[at] or w.q_met_on[pair] == 0:
             continue
         beginning = w.q_c_since[pair] if rules.per_attempt else w.q_c_first[pair]
         news = news or last < beginning <= now
@@ -125,7 +125,7 @@ def contention(w: Memory, rules: Rules, at: int, now: float, last: float) -> tup
 def grow(w: Memory, rules: Rules, robot: int, at: int, now: float, last: float, bored: float) -> float:
     """Mind._grow with Appraisal.adaptive, of a set that is not active; when it changes by itself, in seconds."""
     contended, news, lapse = contention(w, rules, at, now, last)
-    own, floor = own_time(w, robot, at), w.q_floor[at * w.width + at % w.width]
+    own, floor = own_time(w, robot, at), w.q_floor[at * w.width + w.p_mine[at]]
     expects = w.r_knows[robot] and not (floor > 0.0 and own <= floor)
     category = task_category(own, best_time(w, rules, at, own), contended, expects, rules.ordering)
     gate = influence(bored, rules.boredom_threshold, category) if rules.learns else 1
@@ -148,9 +148,9 @@ def grow(w: Memory, rules: Rules, robot: int, at: int, now: float, last: float, 
 def held(w: Memory, rules: Rules, at: int, own: float, now: float) -> tuple[float, float]:
     """The least delta_slow of those who hold a robot back, -1 if nobody does; and when the first patience ends."""
     slow, slowest, holding, ends = INFINITY, INFINITY, False, INFINITY
-    for place in range(w.t_able_count[at // w.width]):
+    for place in range(w.t_able_count[w.p_task[at]]):
         pair = at * w.width + place
-        if place == at % w.width or w.q_met_on[pair] == 0:
+        if place == w.p_mine[at] or w.q_met_on[pair] == 0:
             continue
         phi = phi_of(w, rules, pair, own)
         rate = slow_rate(rules.threshold, phi) if rules.learns else rules.hand_slow_rate
@@ -166,7 +166,7 @@ def held(w: Memory, rules: Rules, at: int, own: float, now: float) -> tuple[floa
     return (slowest if rules.slowest_of_all else slow), ends
 
 
-@compiled
+@inlined
 def _ramp(w: Memory, rules: Rules, at: int, now: float, last: float, rate: float, reset: int, gate: int) -> float:
     """Let a motivation grow or fall; when it reaches the threshold, in seconds; now if it is still 0."""
     if rate != w.p_growth[at]:
@@ -182,6 +182,17 @@ def _ramp(w: Memory, rules: Rules, at: int, now: float, last: float, rate: float
         return now
     ready: float = ramp_reaches(w.p_base[at], w.p_since[at], rate, rules.threshold)
     return ready
+
+
+@inlined
+def first_of(w: Memory, robot: int, highest: float) -> int:
+    """The first of a robot's sets, in the order that breaks ties, whose motivation is the highest."""
+    for index in range(w.r_sets[robot]):
+        task = w.set_task[robot * TASKS + index]
+        at = int(task * w.width + w.place[robot * TASKS + task])
+        if w.p_complete[at] == 0 and w.p_value[at] >= highest - SLACK:
+            return at
+    return -1
 
 
 @compiled
@@ -206,11 +217,7 @@ def think_idle(w: Memory, rules: Rules, robot: int, step: int) -> int:
         if reaches(w.p_value[at], rules.threshold):
             highest = max(highest, w.p_value[at])
     if highest > -INFINITY:
-        for index in range(w.r_sets[robot]):
-            task = w.set_task[robot * TASKS + index]
-            at = task * w.width + w.place[robot * TASKS + task]
-            if w.p_complete[at] == 0 and w.p_value[at] >= highest - SLACK:
-                return int(at)
+        return first_of(w, robot, highest)
     w.r_wake[robot] = NEVER if w.r_open[robot] == 0 else max(step_from(w, rules, robot, changes - EARLY), step + 1)
     return -1
 
@@ -218,10 +225,10 @@ def think_idle(w: Memory, rules: Rules, robot: int, step: int) -> int:
 @compiled
 def occasion(w: Memory, rules: Rules, at: int, now: float) -> int:
     """Mind._occasion: why a task can be taken."""
-    latest, cause, task = -INFINITY, FREE, at // w.width
+    latest, cause, task = -INFINITY, FREE, w.p_task[at]
     for place in range(w.t_able_count[task]):
         pair = at * w.width + place
-        if place == at % w.width or w.q_met_on[pair] == 0:
+        if place == w.p_mine[at] or w.q_met_on[pair] == 0:
             continue
         if is_on(w, rules, pair, now):
             return IMPATIENCE
@@ -234,9 +241,9 @@ def occasion(w: Memory, rules: Rules, at: int, now: float) -> int:
 @compiled
 def take_up(w: Memory, rules: Rules, robot: int, at: int, step: int) -> int:
     """Mind._start: begin to work on a task, and say so; the cause."""
-    now, task = w.now, at // w.width
+    now, task = w.now, w.p_task[at]
     cause = occasion(w, rules, at, now)
-    pair = at * w.width + at % w.width
+    pair = at * w.width + w.p_mine[at]
     w.r_active[robot] = task
     w.r_active_since[robot] = now
     w.r_expected[robot] = own_time(w, robot, at) if rules.learns else rules.hand_yield_time
@@ -246,7 +253,8 @@ def take_up(w: Memory, rules: Rules, robot: int, at: int, step: int) -> int:
     w.q_a_left[pair] = INFINITY
     w.r_wake[robot] = step + 1
     w.r_idle_step[robot] = NEVER
-    w.r_dies[robot] = now + w.r_life[robot]
+    if w.training == 0:
+        w.r_dies[robot] = now + w.r_life[robot]
     beat_until(w, rules, robot, before(w, rules, robot, step))
     say(w, rules, robot, task, step)
     w.r_due[robot] = now + rules.period
@@ -260,7 +268,7 @@ def take_up(w: Memory, rules: Rules, robot: int, at: int, step: int) -> int:
 @compiled
 def rival(w: Memory, rules: Rules, robot: int, at: int, now: float) -> bool:
     """Appraisal.rival: whether a teammate that started at the same time expects to be faster (erratum 15)."""
-    task, mine = at // w.width, at % w.width
+    task, mine = w.p_task[at], w.p_mine[at]
     for place in range(w.t_able_count[task]):
         pair = at * w.width + place
         if place == mine or not is_on(w, rules, pair, now):
@@ -275,7 +283,7 @@ def rival(w: Memory, rules: Rules, robot: int, at: int, now: float) -> bool:
 @compiled
 def not_best(w: Memory, rules: Rules, robot: int, at: int, best: float, contended: bool) -> bool:
     """Whether the learned influence strikes the active set (erratum 1, literal); boredom is 0 while it is active."""
-    own, floor = own_time(w, robot, at), w.q_floor[at * w.width + at % w.width]
+    own, floor = own_time(w, robot, at), w.q_floor[at * w.width + w.p_mine[at]]
     expects = w.r_knows[robot] and not (floor > 0.0 and own <= floor)
     category = task_category(own, best, contended, expects, rules.ordering)
     return influence(0.0, rules.boredom_threshold, category) == 0
@@ -301,6 +309,10 @@ def think_active(w: Memory, rules: Rules, robot: int, step: int) -> int:  # noqa
     active_for = now - w.r_active_since[robot]
     if rules.collisions and contended and rival(w, rules, robot, at, now):
         return COLLISION
+    if w.exploring:
+        w.r_contended[robot] = contended
+        w.r_wake[robot] = NEVER
+        return -1
     if acquiescence(active_for, psi, contended, math.inf) == 0:
         return CONTENDER
     if acquiescence(active_for, psi, contended, lambda_) == 0:
@@ -324,12 +336,13 @@ def lay_down(w: Memory, rules: Rules, robot: int, cause: int, step: int) -> None
     """Mind._stop: cease to work on the active task, and want all tasks anew."""
     now, task = w.now, w.r_active[robot]
     at = task * w.width + w.place[robot * TASKS + task]
-    pair = at * w.width + at % w.width
+    pair = at * w.width + w.p_mine[at]
     if cause != SENSED and w.q_trying[pair]:
         w.q_a_last[pair] = now
         blameless = cause in (COLLISION, NOT_BEST)
         fail(w, rules, robot, pair, not blameless, blameless)
-    w.r_life[robot] = w.r_dies[robot] - now
+    if w.training == 0:
+        w.r_life[robot] = w.r_dies[robot] - now
     w.r_dies[robot] = INFINITY
     w.r_active[robot] = -1
     w.r_contended[robot] = 0

@@ -19,9 +19,10 @@ import numpy as np
 
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
-from lalliance_agents.model.parameters import Architecture, Erratum, Ordering, Strategy
+from lalliance_agents.model.parameters import Architecture, Erratum, Learning, Ordering, Strategy
 from lalliance_study.compiled import Memory
 from lalliance_study.simulator import Timing
+from world_server.world import TRIAL_PAUSE
 
 #: The largest mission: robots, tasks, pairs (tasks x width x width), and samples kept of each pair.
 ROBOTS, TASKS, PAIRS, SAMPLES = 20, 40, 4000, 10
@@ -33,8 +34,8 @@ NEVER = 2**62
 INFINITY = math.inf
 #: What a robot says when it says that it is idle, and when it has said nothing (in this trial, or for ever).
 IDLE, NOTHING = -1, -2
-#: What arrives: a robot's message that says something new, that a task is complete, that a robot is gone.
-HEAR, SENSE, GONE = 0, 1, 2
+#: What arrives: a robot's message that says something new, that a task is complete, that a robot is gone, a new trial.
+HEAR, SENSE, GONE, TRIAL = 0, 1, 2, 3
 
 _ROBOT = {
     "first": "f8",  # its first control step
@@ -73,6 +74,8 @@ _ROBOT = {
     "done": "f8",  # of this attempt, as a share; used where work restarts
     "stuck": "u1",
     "turn": "f8",  # when its body gets stuck, or free again
+    "chance": "u8",  # what its draws come from, and how many it has drawn
+    "drawn": "u8",
     "life": "f8",  # how long it can still be active, in seconds
     "dies": "f8",
 }
@@ -87,6 +90,8 @@ _TASK = {
 }
 _PLACE = {
     "able": "i8",
+    "task": "i8",  # the task and the place of (task, place)
+    "mine": "i8",
     "own": "f8",  # the robot's own time
     "draw": "f8",
     "trap_at": "f8",  # share of an attempt
@@ -100,6 +105,8 @@ _PLACE = {
     "leavers": "i8",  # attempts that were left, and not judged yet
 }
 _PAIR = {
+    "at": "i8",  # the hearer's place, and the robot that is the speaker
+    "speaker": "i8",
     "met_on": "u1",  # whether there is a contact
     "c_first": "f8",
     "c_since": "f8",
@@ -134,6 +141,10 @@ _SCALARS = {
     "look": "f8",  # the world's next look that publishes something
     "next_end": "f8",
     "left": "i8",  # tasks that are not complete
+    "training": "i8",  # trials of active learning before the live one, with the present one
+    "exploring": "u1",  # whether robots explore: ALLIANCE does not learn, and works as ever
+    "trial_at": "f8",  # the world's look that begins the next one
+    "gives_up_at": "f8",  # the world's look that finds that the deadline has come
     "over": "u1",
     "last_end": "f8",
     "soon_head": "i8",
@@ -227,6 +238,7 @@ class Rules(NamedTuple):
     delay: float
     deadline: float
     hand_over: int
+    training: int
 
 
 _KINDS: dict[Any, str] = {float: "f8", bool: "?"}
@@ -293,6 +305,7 @@ def rules_of(mission: Mission, timing: Timing | None = None) -> Rules:
         timing.message_delay,
         mission.deadline,
         HAND_OVERS.index(options.get("hand_over", "shared_max")),
+        sum(phase.trials for phase in mission.phases) - 1,
     )
 
 
@@ -307,10 +320,12 @@ def _refusals(mission: Mission, timing: Timing) -> list[tuple[str, bool]]:
         ("robots differ in their parameters", any(robot.parameters for robot in mission.robots.values())),
         ("parameters set by hand differ between tasks", bool(parameters.by_hand_tasks)),
         ("tasks arrive, or wait for others", any(task.after or task.arrives for task in mission.tasks.values())),
+        ("trials follow one another too quickly",
+         len(mission.phases) > 1
+         and 1.5 * mission.control_period + parameters.broadcast_period + 2 * timing.world_step >= TRIAL_PAUSE),
         ("robots join", any(robot.joins for robot in mission.robots.values())),
         ("it schedules faults", bool(mission.faults)),
-        ("it has several trials", sum(phase.trials for phase in mission.phases) > 1),
-        ("it is an active learning mission", mission.phases[0].learning.value != "adaptive"),
+        ("it is no row of active trials and one adaptive one", not _trains(mission)),
         ("messages take half a control step or longer", timing.message_delay >= mission.control_period / 2),
         ("messages take longer than a step of the world", timing.message_delay >= timing.world_step),
         ("motivation 0 reaches the threshold", parameters.threshold <= 1e-6),
@@ -318,6 +333,13 @@ def _refusals(mission: Mission, timing: Timing) -> list[tuple[str, bool]]:
          len(mission.robots) > ROBOTS or len(mission.tasks) > TASKS or parameters.trials > SAMPLES
          or len(mission.tasks) * width * width > PAIRS or len(mission.tasks) * width > PLACES),
     ]  # fmt: skip
+
+
+def _trains(mission: Mission) -> bool:
+    """Whether a mission is some trials of active learning, or none, and the live one."""
+    *before, live = mission.phases
+    known = all(phase.learning is Learning.ACTIVE and phase.until is None for phase in before)
+    return known and live.learning is Learning.ADAPTIVE and live.trials == 1
 
 
 def new_teams(count: int) -> Memory:

@@ -6,12 +6,13 @@ A task's work is a line between two changes of its crew, so its end is known as 
 
 import math
 
-from lalliance_study.compiled import Memory, compiled
-from lalliance_study.kernel_state import GONE, INFINITY, QUEUE, RESTART, SENSE, SHARED_ADD, TASKS, Rules
+from lalliance_study.compiled import Memory, compiled, inlined
+from lalliance_study.kernel_state import GONE, INFINITY, QUEUE, RESTART, SENSE, SHARED_ADD, TASKS, TRIAL, Rules
 from world_server.environments.task_pool import ROUNDING
+from world_server.world import TRIAL_PAUSE
 
 
-@compiled
+@inlined
 def soon(w: Memory, at: float, kind: int, who: int) -> None:
     """Something will arrive after the delay of messages; all of them are equally long under way."""
     tail = w.soon_tail % QUEUE
@@ -32,7 +33,7 @@ def act_soon(w: Memory, rules: Rules, robot: int, task: int) -> None:
     w.acts_tail += 1
 
 
-@compiled
+@inlined
 def look_at(rules: Rules, instant: float) -> float:
     """The first look of the world server that finds what happened at `instant`."""
     return math.ceil(instant / rules.world_step - 1e-9) * rules.world_step
@@ -52,13 +53,13 @@ def plan(w: Memory, rules: Rules) -> None:
     w.look = look_at(rules, unpublished) if unpublished < INFINITY else INFINITY
 
 
-@compiled
+@inlined
 def _rate(w: Memory, task: int, robot: int) -> float:
     own: float = w.p_own[task * w.width + w.place[robot * TASKS + task]]
     return 0.0 if w.r_stuck[robot] else 1.0 / own
 
 
-@compiled
+@inlined
 def _end(share: float, rate: float, now: float) -> float:
     """When a share of work is whole."""
     if 1.0 - share <= ROUNDING and rate > 0.0:
@@ -115,7 +116,10 @@ def close(w: Memory, rules: Rules, now: float) -> None:
 def touch(w: Memory, rules: Rules, now: float) -> bool:
     """The world lets time pass until `now`; whether the trial is over."""
     close(w, rules, now)
-    if w.left == 0 or now >= w.began + rules.deadline:
+    if w.left == 0 and w.training > 0:
+        w.trial_at = look_at(rules, w.last_end + TRIAL_PAUSE)
+        w.gives_up_at = INFINITY
+    elif w.left == 0 or now >= w.began + rules.deadline:
         w.over = 1
     over: bool = w.over == 1
     return over
@@ -147,7 +151,8 @@ def _turn_to(w: Memory, rules: Rules, robot: int, task: int, now: float) -> None
     settle_crew(w, rules, task, now)
     w.r_body[robot] = task
     at = task * w.width + w.place[robot * TASKS + task]
-    w.r_turn[robot] = now + w.p_trap_at[at] * w.p_own[at]
+    if w.training == 0:
+        w.r_turn[robot] = now + w.p_trap_at[at] * w.p_own[at]
     renew_crew(w, rules, task, now)
 
 
@@ -183,6 +188,11 @@ def leave(w: Memory, rules: Rules, robot: int, now: float) -> None:
 @compiled
 def publish(w: Memory, rules: Rules) -> None:
     """One look of the world server."""
+    if w.now >= w.trial_at:
+        w.began = w.last_end + TRIAL_PAUSE
+        w.trial_at = INFINITY
+        soon(w, w.now + rules.delay, TRIAL, 0)
+        return
     if touch(w, rules, w.now):
         return
     for task in range(w.m):

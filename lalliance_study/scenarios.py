@@ -15,15 +15,17 @@ times. Of the robots able to do a task one survives, and its own trap, if it is 
 import math
 import random
 from collections.abc import Iterator
+from itertools import chain
+from itertools import count as counting
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from lalliance_agents.config import EnvironmentChoice, Mission, RobotSpec, TaskSpec
+from lalliance_agents.config import EnvironmentChoice, Mission, Phase, RobotSpec, TaskSpec
 from lalliance_agents.model.monitor import Record as Learned
-from lalliance_agents.model.parameters import NotNegative, Parameters, Positive, Record
+from lalliance_agents.model.parameters import Learning, NotNegative, Parameters, Positive, Record
 from lalliance_study.circumstances import Circumstances, Trap
 from world_server.environments.task_pool import HandOver
 
@@ -55,9 +57,11 @@ class Scenario(Record):
     traps: float = Field(default=0.0, ge=0, le=1)
     """Probability that a robot gets stuck at a task it can do (the paper's PWW is false)."""
     noise: float = Field(default=0.0, ge=0, lt=0.5)
-    """Coefficient of variation of the samples that a robot has of anybody's time, drawn uniformly."""
+    """Coefficient of variation of the samples that a robot is given, drawn uniformly; what it measures itself is exact."""
     samples: int = Field(default=10, ge=0, le=10)
     """Samples that a robot has, mu; 0: it knows nothing."""
+    training: int = Field(default=0, ge=0, le=1000)
+    """Trials of active learning before the mission, in which nobody dies or gets stuck."""
     cap: Positive = 4.0
     """A mission is given up after this many times the time in which one slow robot would do all the tasks."""
 
@@ -86,6 +90,8 @@ class Missions(NamedTuple):
     """For how long; infinite: for ever: [count, tasks, width]."""
     known: Floats
     """Samples that each of those able has of each: [count, tasks, hearer, speaker, samples]."""
+    chance: NDArray[np.uint64]
+    """The word from which all comes that a robot draws after the first trial has begun: [count, robots]."""
 
 
 class _Draws:
@@ -93,20 +99,32 @@ class _Draws:
 
     def __init__(self, seed: int, scenario: int, count: int) -> None:
         sequence = np.random.SeedSequence(seed, spawn_key=(scenario,))
-        self._words = sequence.generate_state(count, np.uint64)
+        self._words = sequence.generate_state(count, np.uint64).astype(np.uint64)
         self._block = 0
+
+    def words(self, *shape: int) -> NDArray[np.uint64]:
+        """Words of 64 bits: [count, *shape]."""
+        counters = np.arange(math.prod(shape), dtype=np.uint64) + np.uint64(self._block << 32)
+        self._block += 1
+        return _mixed(self._words[:, None], counters).reshape(len(self._words), *shape)
 
     def uniform(self, *shape: int) -> Floats:
         """Numbers in [0, 1): [count, *shape]."""
-        counters = np.arange(math.prod(shape), dtype=np.uint64) + np.uint64(self._block << 32)
-        self._block += 1
-        mixed: NDArray[np.uint64] = self._words[:, None] + counters * np.uint64(0x9E3779B97F4A7C15)
-        for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
-            mixed ^= mixed >> np.uint64(shift)
-            mixed *= np.uint64(factor)
-        mixed ^= mixed >> np.uint64(31)
-        found: Floats = (mixed >> np.uint64(11)).astype(np.float64) * 2.0**-53
-        return found.reshape(len(self._words), *shape)
+        return _unit(self.words(*shape))
+
+
+def _mixed(word: NDArray[np.uint64], counter: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    mixed = word + counter * np.uint64(0x9E3779B97F4A7C15)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        mixed ^= mixed >> np.uint64(shift)
+        mixed *= np.uint64(factor)
+    mixed ^= mixed >> np.uint64(31)
+    return mixed
+
+
+def _unit(words: NDArray[np.uint64]) -> Floats:
+    found: Floats = (words >> np.uint64(11)).astype(np.float64) * 2.0**-53
+    return found
 
 
 def draw_missions(scenario: Scenario, count: int, *, seed: int = 0, number: int = 0) -> Missions:
@@ -131,7 +149,7 @@ def draw_missions(scenario: Scenario, count: int, *, seed: int = 0, number: int 
     known = np.repeat(own[:, :, None, :, None], width, axis=2).repeat(scenario.samples, axis=-1)
     if scenario.noise > 0.0:
         known *= 1 + scenario.noise * math.sqrt(3) * (2 * draws.uniform(*known.shape[1:]) - 1)
-    return Missions(able, own, phase, draw, life, trap_at, trap_lasts, known)
+    return Missions(able, own, phase, draw, life, trap_at, trap_lasts, known, draws.words(n))
 
 
 def _factors(scenario: Scenario, draws: _Draws, able: NDArray[np.int64]) -> Floats:
@@ -179,6 +197,13 @@ def _traps(scenario: Scenario, draws: _Draws, own: Floats, survivor: NDArray[np.
 # --- for the exact simulator
 
 
+def _stream(word: np.uint64) -> Iterator[float]:
+    """The draws of a word, one after the other."""
+    for block in counting():
+        counters = np.arange(block << 10, (block + 1) << 10, dtype=np.uint64)
+        yield from map(float, _unit(_mixed(np.array([word]), counters)))
+
+
 class _Scripted(random.Random):
     """Draws what it is told to, and no more."""
 
@@ -207,10 +232,16 @@ def mission_of(
         tasks={f"t{task:02}": TaskSpec() for task in range(scenario.tasks)},
         robots={name: RobotSpec(tasks=times) for name, times in tasks.items() if times},
         parameters=parameters,
+        phases=_phases(scenario),
         control_period=CONTROL_PERIOD,
         deadline=scenario.deadline,
     )
     return mission, _circumstances(missions, number, spelled, pairs)
+
+
+def _phases(scenario: Scenario) -> tuple[Phase, ...]:
+    live = Phase(learning=Learning.ADAPTIVE)
+    return (Phase(learning=Learning.ACTIVE, trials=scenario.training), live) if scenario.training else (live,)
 
 
 def _circumstances(
@@ -227,7 +258,8 @@ def _circumstances(
     def chance(_: Mission, name: str, __: int) -> random.Random:
         row = [float(missions.draw[number, task, place]) for task, place, robot in pairs if robot == name]
         first = float(missions.phase[number, spelled.index(name)])
-        return _Scripted(iter([*row, first, *row]))
+        word = missions.chance[number, spelled.index(name)]
+        return _Scripted(chain([*row, first, *row], _stream(word)))
 
     return Circumstances(
         learned=learned if missions.known.shape[-1] else {},

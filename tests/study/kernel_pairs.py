@@ -45,6 +45,7 @@ def draw_point(seed: int, **fixed: Any) -> tuple[Scenario, Parameters]:
         "traps": chance.choice([0, 0, 0.2, 0.6]),
         "noise": chance.choice([0, 0.1, 0.3]),
         "samples": chance.choice([10, 10, 3, 0]),
+        "training": chance.choice([0, 0, 0, 1, 3]),
     }
     readings = dict.fromkeys(chance.sample(LITERAL, chance.choice([0, 0, 0, 1, 2])), "literal")
     if chance.random() < 0.2:

@@ -35,6 +35,11 @@ def test_missions_in_which_bodies_get_stuck_are_the_same(seed: int) -> None:
     assert difference(seed, **{**PLAIN, "traps": 0.5}) is None
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_missions_after_active_learning_are_the_same(seed: int) -> None:
+    assert difference(seed, missions=1, training=4, samples=0, heterogeneity=100.0) is None
+
+
 @pytest.mark.parametrize("reading", LITERAL)
 def test_missions_with_a_literal_reading_are_the_same(reading: str) -> None:
     for seed in range(4):
