@@ -12,13 +12,14 @@ from enum import Enum
 
 from lalliance_agents.agent import translate
 from lalliance_agents.agent.behavior import TaskSense
-from lalliance_agents.agent.briefing import chance_of, new_mind, roster, tasks_of
+from lalliance_agents.agent.briefing import new_mind, roster, tasks_of
 from lalliance_agents.config import Mission
 from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, Heard, TrialStarted
 from lalliance_agents.model.mind import Mind
 from lalliance_agents.model.parameters import SLACK
 from lalliance_agents.wire.messages import Effect
 from lalliance_study.air import AirLink, Spoken
+from lalliance_study.circumstances import Circumstances
 
 
 class Process(Enum):
@@ -42,6 +43,7 @@ class Member:
     Args:
         mission: its mission.
         name: which robot.
+        circumstances: what it has learned before, and where its chance comes from.
         message_delay: how long each of its messages is under way, in seconds.
         every_step: whether to make all control steps and to take in all messages.
         decided: called with each decision.
@@ -54,6 +56,7 @@ class Member:
         mission: Mission,
         name: str,
         *,
+        circumstances: Circumstances,
         message_delay: float,
         every_step: bool,
         decided: Decided,
@@ -79,6 +82,7 @@ class Member:
         self.abilities = {mate: frozenset(mission.robots[mate].tasks) for mate in mission.teammates(name)}
         self.effects: Counter[tuple[str, str]] = Counter()
         self._mission = mission
+        self._circumstances = circumstances
         self._delay = message_delay
         self._every_step = every_step
         self._decided = decided
@@ -111,8 +115,9 @@ class Member:
         self.process = Process.RUNNING
         self.there = True
         self.incarnation += 1
-        chance = chance_of(self._mission, self.name, self.incarnation)
-        self._mind = new_mind(self._mission, self.name, chance, now=now)
+        chance = self._circumstances.chance_of(self._mission, self.name, self.incarnation)
+        learned = self._circumstances.learned.get(self.name)
+        self._mind = new_mind(self._mission, self.name, chance, now=now, learned=learned)
         self._mind.handle(roster(self._mission, self.name), now)
         self.trial = 0
         self.task = None

@@ -21,6 +21,7 @@ from lalliance_agents.model.events import Decision
 from lalliance_agents.wire.keys import WORLD
 from lalliance_agents.wire.messages import Action, DecisionMade, LinkReport
 from lalliance_study.air import AirLink
+from lalliance_study.circumstances import Circumstances, Mishaps
 from lalliance_study.member import Member, Process
 from world_server.environments.base import TaskView
 from world_server.failures import Deed, Order
@@ -82,6 +83,7 @@ class Simulator:
         every_step: make every control step and take in every message, as a real run does, instead of only those in which
             something may happen. The result is the same, and comes later.
         watcher: told what robots sense and decide, as they do.
+        circumstances: what the mission is told beyond its file.
     """
 
     def __init__(
@@ -91,6 +93,7 @@ class Simulator:
         timing: Timing | None = None,
         every_step: bool = False,
         watcher: Watcher | None = None,
+        circumstances: Circumstances | None = None,
     ) -> None:
         self.mission = mission
         self.now = 0.0
@@ -100,10 +103,13 @@ class Simulator:
         self._heap: list[tuple[float, int, int, Callable[..., None], tuple[Any, ...]]] = []
         self._serial = 0
         self.world = World(mission, 0.0, self._tell)
+        circumstances = circumstances or Circumstances()
+        self._mishaps = Mishaps(circumstances, self.world, self._at, self._kill)
         self.members = {
             name: Member(
                 mission,
                 name,
+                circumstances=circumstances,
                 message_delay=self._timing.message_delay,
                 every_step=every_step,
                 decided=self._decided,
@@ -232,6 +238,7 @@ class Simulator:
     def _see(self, name: str, present: bool) -> None:
         """The world sees a process come or go."""
         self.world.presence(name, present, self.now)
+        self._mishaps.look(name, self.now)
         if present and self.world.trial and not self.world.over:
             self._late.discard(name)
             self._soon(self._sense, name, self._whole_view())
@@ -253,9 +260,7 @@ class Simulator:
             return  # it is still starting; the order stands, and meets it as soon as it is there
         match order.deed:
             case Deed.KILL:
-                self._note(order.robot, "killed")
-                member.kill(self.now)
-                self._soon(self._see, order.robot, False)
+                self._kill(order.robot)
             case Deed.START:
                 if member.process is not Process.GONE:
                     return
@@ -273,6 +278,11 @@ class Simulator:
                     self._soon(self._see_again, order.robot)
         self._served.add(order.number)
         self._soon(self._confirm, order.number)
+
+    def _kill(self, name: str) -> None:
+        self._note(name, "killed")
+        self.members[name].kill(self.now)
+        self._soon(self._see, name, False)
 
     def _see_again(self, name: str) -> None:
         self.world.presence(name, True, self.now)
@@ -298,6 +308,7 @@ class Simulator:
         )
         if self._watcher is not None:
             self._watcher.decided(member.name, decision)
+        self._mishaps.decided(member.name, decision.verb, self.now)
         self._seq += 1
         made = DecisionMade.model_construct(
             sender=member.name,
@@ -326,6 +337,7 @@ class Simulator:
     def _act(self, action: Action) -> None:
         """An action reaches the world, also if its robot was killed meanwhile: the world sees that after it."""
         self.world.act(action, self.now)
+        self._mishaps.look(action.sender, self.now)
         self._look()
 
     def _hear_decision(self, made: DecisionMade) -> None:
@@ -343,6 +355,7 @@ class Simulator:
                 if before is None or before.trial != member.trial or self.world.learning == "active":
                     before = self._action(member)
                 self.world.act(before, self.now)
+                self._mishaps.look(member.name, self.now)
         self._report(final=False)
         for name in list(self._late):
             # Senses that come late are refreshed all the same, and the refresh comes late.
