@@ -16,6 +16,10 @@ The variant:
   cannot spoil the diminishing marginal gain on which convergence rests. Then at least one more bid is settled in each round,
   and there are at most as many rounds with changes as tasks.
 
+With these scores it ends, as long as nobody dies, with the plan of `baselines.auction`: tasks enter a bundle from short to
+long, so that a bid falls with the completion time alone, and CBBA is known to find what a sequential greedy auction finds.
+After a death the two differ, as here all is planned anew that nobody has begun.
+
 It knows only living robots and true times, and is run again, to its end and in no time, whenever a death is noticed.
 """
 
@@ -28,7 +32,7 @@ from lalliance_study.queues import Plan, Situation
 
 
 @dataclass(slots=True)
-class _Bidder:
+class Bidder:
     """One robot's bundle, in the order in which it grew, with its bids."""
 
     lengths: dict[int, float]
@@ -83,7 +87,7 @@ class _Bidder:
         return False
 
 
-def _best(bidders: list[_Bidder]) -> dict[int, tuple[float, int]]:
+def _best(bidders: list[Bidder]) -> dict[int, tuple[float, int]]:
     """The winning bid on each task that has one: (bid, -robot)."""
     best: dict[int, tuple[float, int]] = {}
     for robot, bidder in enumerate(bidders):
@@ -108,20 +112,19 @@ def consensus(situation: Situation) -> tuple[Plan, int]:
         return [[] for _ in situation.times], 0
     scale = _scale(situation)
     bidders = [
-        _Bidder(
+        Bidder(
             {task: float(row[task]) / scale for task in situation.open if np.isfinite(row[task])}, float(ready) / scale
         )
         for row, ready in zip(situation.times, situation.ready, strict=True)
     ]
-    rounds = 0
-    while True:
+    for rounds in range(len(situation.times) * len(situation.open) + 1):
         known = _best(bidders)
         grown = [bidder.grow(known, robot) for robot, bidder in enumerate(bidders)]
         told = _best(bidders)
         released = [bidder.release(told, robot) for robot, bidder in enumerate(bidders)]
         if not any(grown) and not any(released):
             return [bidder.path() for bidder in bidders], rounds
-        rounds += 1
+    raise RuntimeError("CBBA does not come to an agreement, although bids never rise")
 
 
 def cbba(situation: Situation) -> Plan:

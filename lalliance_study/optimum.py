@@ -111,7 +111,7 @@ def optimum(
         tolerance: up to which share the makespan may be above the optimum and still count as proven.
         time_limit: of the search, in seconds.
         work_limit: of the search, in CP-SAT's deterministic seconds, which do not depend on the machine; so what is left
-            unproven does not either. One takes about two to ten seconds.
+            unproven does not either. One takes about a second.
 
     Raises:
         UnreachableTaskError: a task that no robot can do.

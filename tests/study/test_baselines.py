@@ -11,7 +11,7 @@ from study.problems import best_of_all, drawn, tables
 from lalliance_agents.errors import UserError
 from lalliance_study.assignments import Floats
 from lalliance_study.baselines import BASELINES, repaired_optimum
-from lalliance_study.cbba import consensus
+from lalliance_study.cbba import Bidder, consensus
 from lalliance_study.optimum import optimum, shared_optimum
 from lalliance_study.queues import Plan, Situation, carry_out
 from world_server.environments.task_pool import HandOver
@@ -129,28 +129,23 @@ def test_cbba_converges_without_conflict(times: Floats, data: st.DataObject) -> 
     assert 1 <= rounds <= times.shape[1]
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(0.01, 5.0), min_size=1, max_size=8), st.floats(0, 3))
+def test_a_bid_is_what_a_task_adds_to_the_worth_of_the_best_path(lengths: list[float], ready: float) -> None:
+    """Also where longer tasks are in the bundle already, which then are delayed."""
+
+    def worth(held: list[float]) -> float:
+        return float(np.exp(-ready - np.cumsum(np.sort(held))).sum())
+
+    bidder = Bidder(dict(enumerate(lengths)), ready, bundle=list(range(1, len(lengths))))
+    assert bidder.gain(0) == pytest.approx(worth(lengths) - worth(lengths[1:]), rel=1e-6, abs=1e-12)
+
+
 @pytest.mark.parametrize("seed", range(10))
-def test_cbba_gives_what_one_who_knows_all_bids_would_give(seed: int) -> None:
-    """With diminishing marginal gain it ends with the sequential greedy plan (Choi, Brunet, How, theorem 1)."""
+def test_where_nobody_dies_cbba_ends_with_the_plan_of_the_auction(seed: int) -> None:
+    """The sequential greedy plan (Choi, Brunet, How, theorem 1), by those who know only the highest bids."""
     times = drawn(seed, 5, 12, 3, 3.0)
-    scale = times.min(axis=0).mean()
-
-    def worth(robot: int, tasks: list[int]) -> float:
-        return float(np.exp(-np.cumsum(np.sort(times[robot, tasks])) / scale).sum())
-
-    held: list[list[int]] = [[] for _ in times]
-    left = set(range(times.shape[1]))
-    while left:
-        gains = {
-            (robot, task): worth(robot, [*held[robot], task]) - worth(robot, held[robot])
-            for robot in range(len(times))
-            for task in left
-            if np.isfinite(times[robot, task])
-        }
-        robot, task = max(gains, key=lambda pair: gains[pair])
-        held[robot].append(task)
-        left.remove(task)
-    assert [sorted(queue) for queue in consensus(situation(times))[0]] == [sorted(tasks) for tasks in held]
+    assert [sorted(queue) for queue in plan("cbba", times)] == [sorted(queue) for queue in plan("auction", times)]
 
 
 def test_cbba_bids_on_all_tasks_however_long_they_are() -> None:

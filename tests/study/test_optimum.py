@@ -71,6 +71,13 @@ def test_bounds_and_first_assignments_enclose_the_optimum(times: Floats) -> None
     assert shared.lower <= one_each * (1 + 1e-9)
 
 
+def test_a_bound_without_the_slower_robots_ends_where_one_of_them_helps() -> None:
+    """Without the pair of 1.5 s all is on one robot, and takes 2 s; so nothing is proven above 1.5 s."""
+    times = np.array([[1.0, 1.0], [INF, 1.5]])
+    assert bounds.one_robot_each(times, np.zeros(2), 2.0) == 1.5
+    assert optimum(times).makespan == 1.5
+
+
 @pytest.mark.parametrize(
     ("robots", "tasks", "coverage", "heterogeneity"),
     [(4, 8, 3, 1.0), (5, 10, 3, 8.0), (10, 20, 3, 1.0), (8, 16, 4, 0.0)],
