@@ -69,7 +69,9 @@ def collisions_are_settled(evidence: Evidence) -> Iterator[str]:
             by_hand = any(
                 mission.parameters_of(one.robot).architecture is Architecture.ALLIANCE for one in (fast, slow)
             )
-            if both and not by_hand and not is_disturbed(evidence, slow.robot, until):
+            # A process that stands still as the other begins may not hear of it before the next announcement.
+            heard = evidence.history.ran_throughout(slow.robot, min(slow.since, fast.since), until)
+            if both and heard and not by_hand and not is_disturbed(evidence, slow.robot, until):
                 yield (
                     f"{slow.robot} and {fast.robot} began {slow.task} at {slow.since:.3f} and {fast.since:.3f}, and "
                     f"{slow.robot} has not yielded by {until:.3f}"
