@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 from lalliance_agents.config import Mission
 from lalliance_agents.model.events import Cause, Decision, Verb
 from lalliance_agents.model.parameters import Erratum
-from lalliance_study.simulator import Line, Simulator, Timing
+from lalliance_study.logbook import Line, Timing
+from lalliance_study.simulator import Simulator
 
 _CAUSES = frozenset(cause.value for cause in Cause)
 _VERBS = frozenset(verb.value for verb in Verb)

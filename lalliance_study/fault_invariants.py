@@ -25,7 +25,7 @@ from lalliance_agents.faults import (
 )
 from lalliance_agents.model.parameters import Architecture, Erratum, Learning
 from lalliance_study.evidence import Choice, Evidence, Sight
-from lalliance_study.simulator import Timing
+from lalliance_study.logbook import Timing
 from world_server.world import REFRESH_PERIOD, STEP
 
 #: From the instant at which something is due in the world to its effect at a robot, in seconds: a step, and messages.

@@ -21,7 +21,7 @@ from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
 from lalliance_agents.model.parameters import Architecture, Erratum, Learning, Ordering, Strategy
 from lalliance_study.compiled import Memory
-from lalliance_study.simulator import Timing
+from lalliance_study.logbook import Timing
 from world_server.world import TRIAL_PAUSE
 
 #: The largest mission: robots, tasks, pairs (tasks x width x width), and samples kept of each pair.

@@ -9,8 +9,7 @@ import heapq
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 from lalliance_agents.agent import translate
 from lalliance_agents.bus.base import LEASE
@@ -22,56 +21,14 @@ from lalliance_agents.wire.keys import WORLD
 from lalliance_agents.wire.messages import Action, DecisionMade, LinkReport
 from lalliance_study.air import AirLink
 from lalliance_study.circumstances import Circumstances, Mishaps
+from lalliance_study.logbook import Follower, Line, Timing, Watcher
 from lalliance_study.member import Member, Process
 from world_server.environments.base import TaskView
 from world_server.failures import Deed, Order
-from world_server.world import REFRESH_PERIOD, STEP, Happening, Stage, World
-
-
-@dataclass(frozen=True, slots=True)
-class Timing:
-    """Delays of a real run, in seconds of mission time."""
-
-    message_delay: float = 0.001
-    """Of every message, before link rules."""
-    world_step: float = STEP
-    """Between two looks of the world server at its world."""
-    start_up: float = 0.4
-    """From the order to start a robot to its presence on the bus."""
-
-
-class Line(NamedTuple):
-    """One line of the event log."""
-
-    at: float
-    """Seconds since the simulation began."""
-    who: str
-    what: str
-    task: str | None
-    why: str
-    other: str | None
-
-    def __str__(self) -> str:
-        other = f" {self.other}" if self.other else ""
-        return f"{self.at:.6f} {self.who} {self.what}{f' {self.task}' if self.task else ''}: {self.why}{other}"
-
+from world_server.world import REFRESH_PERIOD, Happening, Stage, World
 
 Senses = tuple[int, str, list[tuple[str, bool, bool]]]
 """What the world says of tasks: the trial, its way of learning, and of each task whether it is applicable, and complete."""
-
-
-class Watcher(Protocol):
-    """Whoever wants to know more of a run than its log tells."""
-
-    def sensed(self, at: float, robot: str, task: str, applicable: bool, complete: bool) -> None:
-        """A robot senses that a task stands otherwise than it knew."""
-
-    def decided(self, robot: str, decision: Decision) -> None:
-        """A robot has decided something, with all that is behind it."""
-
-
-Follower = Callable[[Happening | DecisionMade], None]
-"""Whoever hears what an operator of a real run does."""
 
 
 class Simulator:

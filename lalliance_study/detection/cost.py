@@ -11,7 +11,8 @@ from typing import Any
 from lalliance_agents.config import Mission
 from lalliance_study.detection.probe import RATE
 from lalliance_study.detection.rows import Cost
-from lalliance_study.simulator import Line, Simulator
+from lalliance_study.logbook import Line
+from lalliance_study.simulator import Simulator
 
 ROBOTS, TASKS, COVERAGE = 6, 18, 3
 #: Range of own times, and of the instant at which a robot crashes, in seconds.

@@ -14,7 +14,8 @@ import numpy as np
 from lalliance_agents.config import Mission
 from lalliance_agents.faults import Crash
 from lalliance_study.detection.law import Loss
-from lalliance_study.simulator import Simulator, Timing
+from lalliance_study.logbook import Timing
+from lalliance_study.simulator import Simulator
 
 RATE = 5.0
 #: The common task comes into being when everybody is busy but the speaker; a while later all is steady; in seconds.

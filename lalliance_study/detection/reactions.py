@@ -13,7 +13,8 @@ from typing import Any
 from lalliance_agents.config import Mission
 from lalliance_study.detection.probe import RATE
 from lalliance_study.detection.rows import Reaction
-from lalliance_study.simulator import Line, Simulator
+from lalliance_study.logbook import Line
+from lalliance_study.simulator import Simulator
 
 VICTIM = "first"
 #: Own times at the tasks, in seconds.

@@ -21,7 +21,8 @@ from lalliance_study.detection.law import (
 from lalliance_study.detection.probe import RATE, SPEAKER, count_suspicions, hearer, probe, quantiles, time_detections
 from lalliance_study.detection.reactions import reaction
 from lalliance_study.detection.rows import Cost, Detections, Reaction, Suspicions, load, save
-from lalliance_study.simulator import Line, Simulator
+from lalliance_study.logbook import Line
+from lalliance_study.simulator import Simulator
 
 DOCS = Path(__file__).parents[2] / "docs"
 ROWS = DOCS / "faults" / "rows"

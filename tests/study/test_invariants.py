@@ -10,7 +10,7 @@ import pytest
 from lalliance_agents.mission_file import parse_mission
 from lalliance_study.evidence import Choice, Evidence, Sight, gather
 from lalliance_study.invariants import INVARIANTS, judge
-from lalliance_study.simulator import Line
+from lalliance_study.logbook import Line
 
 CRASH = """
 name: crash

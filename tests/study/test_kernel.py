@@ -11,8 +11,8 @@ from lalliance_agents.errors import UserError
 from lalliance_agents.model.parameters import Parameters
 from lalliance_study.kernel import RESULTS, run_in_threads, run_missions
 from lalliance_study.kernel_state import rules_of
+from lalliance_study.logbook import Timing
 from lalliance_study.scenarios import Missions, Scenario, draw_missions, mission_of
-from lalliance_study.simulator import Timing
 
 #: The first test to need the kernel waits until it is compiled.
 pytestmark = pytest.mark.timeout(600)

@@ -8,7 +8,8 @@ import pytest
 from support.processes import MISSIONS
 
 from lalliance_agents.mission_file import load_mission, parse_mission
-from lalliance_study.simulator import Simulator, Timing
+from lalliance_study.logbook import Timing
+from lalliance_study.simulator import Simulator
 from world_server.environments import check_options
 
 PAIR = """
