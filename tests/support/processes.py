@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import uuid
 from collections.abc import Callable, Iterator
@@ -23,6 +24,8 @@ class Processes:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._mark = uuid.uuid4().hex
+        # What a command that is killed leaves there goes with the test.
+        self._temporary = tempfile.TemporaryDirectory(prefix="lalliance-test-", ignore_cleanup_errors=True)
         self._started: list[subprocess.Popen[str]] = []
 
     def __enter__(self) -> Self:
@@ -37,6 +40,7 @@ class Processes:
         for process in self._started:
             process.kill()
             process.communicate()
+        self._temporary.cleanup()
 
     def start(self, *arguments: str | Path) -> "subprocess.Popen[str]":
         """Start `lalliance` with `arguments`; its output is piped."""
@@ -51,7 +55,13 @@ class Processes:
             text=True,
             cwd=self.folder,
             # Missions of other tests, which may have the same name, are not to be found.
-            env={**os.environ, _MARK: self._mark, "COLUMNS": "120", "XDG_RUNTIME_DIR": str(self.folder)},
+            env={
+                **os.environ,
+                _MARK: self._mark,
+                "COLUMNS": "120",
+                "XDG_RUNTIME_DIR": str(self.folder),
+                "TMPDIR": self._temporary.name,
+            },
         )
         self._started.append(process)
         return process

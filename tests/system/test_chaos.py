@@ -92,7 +92,7 @@ def test_what_contradicts_a_fault_in_force_is_refused(processes: Processes, team
     )
     table = processes.chaos(team, "status")
     assert re.search(r"^Mission team: running at [\d.]+ s$", table, flags=re.MULTILINE)
-    assert re.search(r"^1-slow +slow of left by 2 .* healed +on +fired at", table, flags=re.MULTILINE)
+    assert re.search(r"^1-slow +slow of left by 2 .* for good +on +fired at", table, flags=re.MULTILINE)
 
 
 def test_a_mission_whose_robots_were_all_killed_by_an_operator_lasts_until_its_deadline(
