@@ -4,6 +4,7 @@ An invariant is a function from `Evidence` to the sentences in which it was brok
 all. Here stand those of tasks, robots and accounts; what concerns faults and silence is in `fault_invariants`.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import NamedTuple
@@ -147,7 +148,11 @@ def completions_are_sensed(evidence: Evidence) -> Iterator[str]:
     Told of the last trial, and of robots whose senses are not held back for a time.
     """
     mission, began, history = evidence.mission, evidence.began, evidence.history
-    delays = {one.robot: one.delay for one in mission.faults if isinstance(one, Blind)}
+    delays: dict[str, float] = {}
+    for fault in mission.faults:
+        if isinstance(fault, Blind):
+            late = math.inf if fault.delay is None else fault.delay
+            delays[fault.robot] = max(delays.get(fault.robot, 0.0), late)
     sensed = {
         (note.robot, note.task)
         for note in evidence.notes
@@ -159,7 +164,7 @@ def completions_are_sensed(evidence: Evidence) -> Iterator[str]:
         for robot in mission.able(task):
             delay = delays.get(robot, 0.0)
             since = began + record["completed_at"]
-            if delay is None or (robot, task) in sensed:
+            if (robot, task) in sensed:
                 continue
             until = since + REFRESH_PERIOD + 2 * STEP + delay + 0.01
             if until < evidence.ended and history.ran_throughout(robot, since, until):
