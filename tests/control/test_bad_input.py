@@ -193,3 +193,14 @@ def test_the_schema_is_json_and_knows_the_options_of_environments(processes: Pro
     assert schema["properties"]["tasks"]["additionalProperties"] is False
     kinds = [one["if"]["properties"]["kind"]["const"] for one in schema["$defs"]["EnvironmentChoice"]["allOf"]]
     assert kinds == ["task_pool", "box_pushing"]
+
+
+def test_a_robot_that_cannot_use_its_behaviour_sets_ends_the_run(processes: Processes) -> None:
+    (processes.folder / "bots.py").write_text(
+        "from lalliance_agents import BehaviorSet\n\ndef make():\n    return [BehaviorSet('aa')]\n"
+    )
+    (processes.folder / "m.yaml").write_text(changed("two: {", "two: {behaviors: 'bots:make', "))
+    done = processes.run("run", "m.yaml", "--json")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "lalliance: robot two: <BehaviorSet for aa> is for task 'aa', which robot two does not have" in done.stderr
+    assert processes.alive() == []
