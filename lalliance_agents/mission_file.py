@@ -71,7 +71,7 @@ def read_fault(text: str) -> Fault:
     try:
         content = json.loads(text)
         document = {"fault": {"at": 0, **content} if isinstance(content, dict) else content}
-        holder = MissionText(json.dumps(document), source)
+        holder = MissionText(json.dumps(document, ensure_ascii=False), source)
         try:
             return _OneFault.model_validate_json(json.dumps(holder.document), strict=True).fault
         except ValidationError as error:

@@ -45,7 +45,9 @@ app = typer.Typer(
 )
 
 Speed = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Mission seconds per real second.")]
-Seed = Annotated[int | None, typer.Option(min=0, help="All randomness; default: the mission's own seed.")]
+Seed = Annotated[
+    int | None, typer.Option(min=0, max=2**63 - 1, help="All randomness; default: the mission's own seed.")
+]
 Connect = Annotated[str, typer.Option(metavar="ENDPOINT", help="The router to connect to.")]
 Parent = Annotated[int | None, typer.Option(hidden=True, help="End when the process with this id does.")]
 Learned = Annotated[

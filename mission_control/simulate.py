@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 def simulate(
     path: MissionPath,
     runs: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many runs, each with the next seed.")] = 1,
-    seed: Annotated[int | None, typer.Option(min=0, help="The first seed; default: the mission's own.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, max=2**62, help="The first seed; default: the mission's own.")
+    ] = None,
     jobs: Annotated[
         int | None, typer.Option(min=1, max=1024, help="Processes for many runs; default: one per core.")
     ] = None,

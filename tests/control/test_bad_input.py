@@ -204,3 +204,11 @@ def test_a_robot_that_cannot_use_its_behaviour_sets_ends_the_run(processes: Proc
     assert (done.returncode, done.stdout) == (2, "")
     assert "lalliance: robot two: <BehaviorSet for aa> is for task 'aa', which robot two does not have" in done.stderr
     assert processes.alive() == []
+
+
+def test_a_seed_that_no_mission_may_have_is_refused(processes: Processes) -> None:
+    for command in ("run", "simulate", "world"):
+        done = processes.run(command, "good.yaml", "--seed", str(2**63))
+        assert (done.returncode, done.stdout) == (2, "")
+        assert "--seed" in done.stderr
+        assert "Traceback" not in done.stderr
