@@ -2,7 +2,8 @@
 
 The mind is the very one that runs on the bus. Of its control steps only those are made in which something may happen: the
 mind says when that is (`Mind.wake`, `Mind.next_lapse`), events make it sooner, and where nothing but an announcement is due it
-only beats. The result is the same as if all steps had been made; `every_step` makes them all, to show it.
+only beats; where nobody waits for that either (see `air`), it beats when somebody looks. The result is the same as if all steps
+had been made; `every_step` makes them all, to show it.
 """
 
 import math
@@ -16,6 +17,7 @@ from lalliance_agents.agent.briefing import new_mind, roster, tasks_of
 from lalliance_agents.config import Mission
 from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, Heard, TrialStarted
 from lalliance_agents.model.mind import Mind
+from lalliance_agents.model.outlook import AT_ONCE
 from lalliance_agents.model.parameters import SLACK
 from lalliance_agents.wire.messages import Effect
 from lalliance_study.air import AirLink, Spoken
@@ -69,13 +71,18 @@ class Member:
         self.there = False
         self.incarnation = 0
         self.trial = 0
-        self.tau = mission.parameters_of(name).silence_timeout
         self.sent = self.steps = self.beats = 0
         #: Links to those who hear it on a task, and idle.
         self.heard_on: dict[str, list[AirLink]] = {task: [] for task in self.tasks}
         self.heard_idle: list[AirLink] = []
         #: Links from those whom it hears.
         self.hears: list[AirLink] = []
+        own = mission.parameters_of(name)
+        self.tau = own.silence_timeout
+        #: Of its announcements, and of them as they come: see `air.Speaker`.
+        self.longest_gap = own.broadcast_period + 2 * mission.control_period
+        self.latest: Spoken | None = None
+        self.unmade = math.inf
         #: The instant of its next control step, in seconds; infinite while there is none.
         self.due = math.inf
         self.task: str | None = None
@@ -95,6 +102,9 @@ class Member:
         #: Whether the bus has given it up since it was stopped.
         self.given_up = False
         self._told: dict[str, tuple[bool, bool]] = {}
+        self._settled = False
+        #: The links to those who hear what it says now.
+        self._audience: list[AirLink] = []
 
     def __repr__(self) -> str:
         return f"<Member {self.name}: {self.process.value}, {self.task or 'idle'}, trial {self.trial}>"
@@ -112,6 +122,9 @@ class Member:
 
     def start(self, now: float) -> None:
         """Begin a new life."""
+        for link in self.hears:
+            self._keep(link)
+            link.reset(now)
         self.process = Process.RUNNING
         self.there = True
         self.incarnation += 1
@@ -128,10 +141,8 @@ class Member:
         self._first = now + chance.random() * self._period
         self._after_pause = True
         self._missed = 0
-        for link in self.hears:
-            self._keep(link)
-            link.reset()
         self._wake_step = self._lapse_step = self._beat_step = 0
+        self._wanted = AT_ONCE
         self._broadcast_due = now
         self._schedule()
 
@@ -144,6 +155,7 @@ class Member:
 
     def kill(self, now: float) -> None:
         """End as by SIGKILL."""
+        self.unsettle(now)
         if self.runs:
             self._lived += self._periods_here(now)
         self.process = Process.GONE
@@ -156,6 +168,9 @@ class Member:
         """Stop as by SIGSTOP."""
         if self.runs:
             self._listen(now)  # what has come until now is heard, also if it was to be looked at later
+            self.unsettle(now)
+            for link in self.hears:
+                link.speaker.unsettle(now)
             self.process = Process.STOPPED
             self.stopped_at = now
             self.given_up = False
@@ -172,7 +187,7 @@ class Member:
         for link in self.hears:
             if lost:
                 link.waiting.clear()
-                link.forget()
+                link.forget(now)
         self._step = max(math.ceil((now - self._first) / self._period - SLACK), self._step)
         self._missed += int((now - self.stopped_at) / self._period)
         self._after_pause = True
@@ -202,14 +217,15 @@ class Member:
             return
         self._listen(now)
         if trial > self.trial:
+            self.unsettle(now)
             self.trial = trial
             self.task = None
             self._content = None
             self._told.clear()
             self.mind.handle(TrialStarted(translate.learning(learning)), now)
             for link in self.hears:
-                link.forget()
-            self._wake(now)
+                link.forget(now)
+            self._heed(now)
         for task, applicable, complete in views:
             if task in self.heard_on:
                 self._feel(task, TaskSense(applicable, complete, 0.0), now)
@@ -222,23 +238,25 @@ class Member:
                 self._sensed(now, self.name, task, *felt)
             self.mind.handle(translate.sensed(task, *felt), now)
             for link in self.hears:
-                link.forget(task)
-            self._wake(now)
+                link.forget(now, task)
+            self._heed(now)
 
-    def news(self, now: float) -> None:
+    def news(self, link: AirLink, now: float) -> None:
         """A message has come that may be news."""
         if self.runs:
-            self._listen(now)
+            self._take(link, now, each=False)
+            self._heed(now)
 
     def _listen(self, now: float, *, each: bool = False) -> None:
         """Take in what has come until `now`: of rows of refreshes the last, or `each`."""
-        mind = self.mind
         for link in self.hears:
-            if link.waiting:
-                for spoken in link.take(now, each=each or self._every_step):
-                    mind.handle(spoken.heard, spoken.arrives)
-        if mind.wake() < now:
-            self._wake(now)
+            if link.waiting or link.settled:
+                self._take(link, now, each=each)
+        self._heed(now)
+
+    def _take(self, link: AirLink, now: float, *, each: bool) -> None:
+        for spoken in link.take(now, each=each or self._every_step):
+            self.mind.handle(spoken.heard, spoken.arrives)
 
     def _instant(self, step: int) -> float:
         return self._first + step * self._period
@@ -254,15 +272,18 @@ class Member:
             step += 1
         return step if self._instant(step - 1) < instant else step - 1
 
-    def _wake(self, now: float) -> None:
-        """Make a whole step as soon as possible."""
-        step = self._step_from(now)
-        if step < self._wake_step or self._wake_step < self._step:
-            self._wake_step = step
-            self._schedule()
+    def _heed(self, now: float) -> None:
+        """Make a whole step when the mind wants one, after it has perceived something."""
+        wanted = self.mind.wake()
+        if wanted != self._wanted:
+            self._wanted = wanted
+            step = self._step_from(max(wanted, now))
+            if step < self._wake_step or self._wake_step < self._step:
+                self._wake_step = step
+                self._schedule()
 
     def _schedule(self) -> None:
-        self._next = min(self._wake_step, self._lapse_step, self._beat_step)
+        self._next = min(self._wake_step, self._lapse_step, NEVER if self._settled else self._beat_step)
         due = self._first + self._next * self._period if self.runs else math.inf
         if due != self.due:
             self.due = due
@@ -277,7 +298,8 @@ class Member:
             self._listen(now)
             self._lapse_step = self._step_from(mind.next_lapse())
             whole = step >= self._lapse_step or step >= self._wake_step
-        if whole or step >= self._beat_step:
+        if whole or (step >= self._beat_step and not self._settled):
+            self.unsettle(now)
             if not self._after_pause:
                 mind.rest(self._instant(step - 1))
             self._after_pause = False
@@ -286,12 +308,69 @@ class Member:
                 self._listen(now)
                 self._think(now)
             else:
-                self.beats += 1
-                self._perform(mind.beat(now), now)
+                self._beat(step)
             if mind.broadcast_due != self._broadcast_due or self._beat_step <= step:
                 self._broadcast_due = mind.broadcast_due
                 self._beat_step = self._next_beat(step + 1)
+            self._settle()
         self._schedule()
+
+    def _beat(self, step: int) -> None:
+        self.beats += 1
+        now = self._instant(step)
+        self._perform(self.mind.beat(now), now)
+
+    def _settle(self) -> None:
+        """See whether anybody waits for the next announcement."""
+        content = self._content
+        if content is None or self._delay >= self._period:
+            return
+        if all(link.can_settle(content) for link in self._audience):
+            self._settled = True
+            self._row = self._seq + 1
+            self.unmade = self._instant(self._beat_step) + self._delay
+            for link in self._audience:
+                link.settled = True
+
+    def unsettle(self, now: float) -> None:
+        """See `air.Speaker`."""
+        if not self._settled:
+            return
+        self.catch_up(now)
+        for link in self._audience:
+            link.unsettle()
+        self._settled = False
+        self.latest, self.unmade = None, math.inf
+        while self._instant(self._beat_step) < now:  # what is still under way
+            self._beat(self._beat_step)
+            self._beat_step = self._next_beat(self._beat_step + 1)
+        self._schedule()
+
+    def catch_up(self, now: float) -> None:
+        """See `air.Speaker`."""
+        if now < self.unmade:
+            return
+        mind, before, made = self.mind, self._seq, self._beat_step
+        while self.unmade <= now:
+            made = self._beat_step
+            mind.keep_beat(self._instant(made))
+            self._seq += 1
+            self._beat_step = self._next_beat(made + 1)
+            self.unmade = self._instant(self._beat_step) + self._delay
+        self._broadcast_due = mind.broadcast_due
+        self._step = max(self._step, made + 1)
+        self.beats += self._seq - before
+        self.sent += self._seq - before
+        at = self._instant(made)
+        mind.rest(at)
+        for said in mind.announcement(at):
+            self.latest = self._spoken(said, at, self._row)
+
+    def take_stock(self, now: float) -> None:
+        """Make and take in all that has come until `now`, so that it is counted."""
+        if self.runs:
+            self.unsettle(now)
+            self._listen(now)
 
     def _think(self, now: float) -> None:
         self.steps += 1
@@ -300,7 +379,8 @@ class Member:
             self._wake_step = self._step
             self._lapse_step = NEVER
         else:
-            self._wake_step = self._step_from(self.mind.wake())
+            self._wanted = self.mind.wake()
+            self._wake_step = self._step_from(self._wanted)
             self._lapse_step = self._step_from(self.mind.next_lapse())
 
     def _next_beat(self, step: int) -> int:
@@ -330,10 +410,14 @@ class Member:
         self._seq += 1
         if self._content is None:
             self._content = object()
-        heard = Heard(self.name, said.task, said.active_for, said.expected)
-        spoken = Spoken(now + self._delay, self.incarnation, self._seq, self.trial, self._content, heard)
-        for link in self.heard_idle if said.task is None else self.heard_on[said.task]:
+            self._audience = self.heard_idle if said.task is None else self.heard_on[said.task]
+        spoken = self._spoken(said, now)
+        for link in self._audience:
             link.send(spoken)
+
+    def _spoken(self, said: Announce, now: float, first: int | None = None) -> Spoken:
+        heard = Heard(self.name, said.task, said.active_for, said.expected)
+        return Spoken(now + self._delay, self.incarnation, self._seq, self.trial, self._content, heard, first)
 
 
 #: The number of a control step that is never made.

@@ -99,7 +99,7 @@ class Simulator:
         for name, member in self.members.items():
             for mate in self.mission.teammates(name):
                 hearer = self.members[mate]
-                link = AirLink(name, hearer, self._news_for(hearer), every_step=every_step)
+                link = AirLink(member, hearer, self._announce_news, every_step=every_step)
                 links.append(link)
                 hearer.hears.append(link)
                 member.heard_idle.append(link)
@@ -108,14 +108,11 @@ class Simulator:
                         member.heard_on[task].append(link)
         return links
 
-    def _news_for(self, hearer: Member) -> Callable[[float], None]:
-        def announce(at: float) -> None:
-            self._at(at, 0, self._bring_news, hearer)
+    def _announce_news(self, link: AirLink, at: float) -> None:
+        self._at(at, 0, self._bring_news, link)
 
-        return announce
-
-    def _bring_news(self, hearer: Member) -> None:
-        hearer.news(self.now)
+    def _bring_news(self, link: AirLink) -> None:
+        self.members[link.hearer.name].news(link, self.now)
 
     def _at(self, instant: float, priority: int, deed: Callable[..., None], *arguments: Any) -> None:
         self._serial += 1
@@ -328,6 +325,9 @@ class Simulator:
 
     def _report(self, *, final: bool) -> None:
         """Tell the world what robots sent and received: all at the end, and meanwhile those to whom a fault did something."""
+        if final:
+            for member in self.members.values():
+                member.take_stock(self.now)
         for member in self.members.values():
             effects = member.total_effects()
             touched = sum(effect.count for effect in effects)
@@ -393,6 +393,8 @@ class Simulator:
         rules = self.world.rules()
         if self._rules is None or self._rules.rules != tuple(rules):
             self._rules = LinkRules(self.mission.seed, rules)
+            for member in self.members.values():
+                member.unsettle(self.now)
             for link in self._links:
                 link.rule = self._rules.on(link.sender, link.hearer.name)
         blind = {one.robot: (one.fault, one.delay) for one in self.world.blind()}

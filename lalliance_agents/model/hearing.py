@@ -168,14 +168,15 @@ class Hearing:
             return False
         return any(self.is_news(contact, before, now) for contact in self.contacts(task))
 
-    def note_checked(self) -> bool:
-        """All that was heard so far has been counted: it is no news to the next step. Whether there was any news."""
+    def note_checked(self, until: float = math.inf) -> bool:
+        """All that was first heard up to `until` has been counted: it is no news to the next step. Whether any was."""
         if not self._news:
             return False
-        for contact in self._news:
+        counted = [contact for contact in self._news if self.beginning(contact) <= until]
+        for contact in counted:
             contact.noticed = True
-        self._news.clear()
-        return True
+        self._news = [contact for contact in self._news if not contact.noticed]
+        return bool(counted)
 
     def beginning(self, contact: Contact) -> float:
         """The instant with which first-heard windows begin (erratum 16)."""
