@@ -40,6 +40,11 @@ class Hearer(Protocol):
     trial: int
     there: bool
     """Whether it has a process, and with that somewhere for messages to arrive."""
+    heeded: set[str]
+    """The teammates on settled links: they cannot fall silent unnoticed."""
+
+    def doubt(self, instant: float) -> None:
+        """A teammate that was heeded may fall silent, but not before `instant`."""
 
     @property
     def runs(self) -> bool:
@@ -165,14 +170,24 @@ class AirLink:
         steady = self._can_settle and self._in_order and self.rule is None
         return steady and self._content is content and self.hearer.runs
 
+    def settle(self) -> None:
+        """From now on nobody waits for what comes."""
+        self.settled = True
+        if self.hearer.there:
+            self.hearer.heeded.add(self.sender)
+
     def unsettle(self) -> None:
         """Have what has come, and was not taken, wait like everything else."""
         self.settled = False
         latest = self.speaker.latest
-        if latest is not None and self.hearer.there:
+        if not self.hearer.there:
+            return
+        if latest is not None:
             self._latest = latest.arrives
             if self._is_new(latest):
                 self.waiting.append(latest)
+        self.hearer.heeded.discard(self.sender)
+        self.hearer.doubt(self._latest + self.hearer.tau - EARLY)
 
     def _is_new(self, spoken: Spoken) -> bool:
         return (spoken.incarnation, spoken.seq) > (self._incarnation, self._seq)

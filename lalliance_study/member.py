@@ -77,6 +77,7 @@ class Member:
         self.heard_idle: list[AirLink] = []
         #: Links from those whom it hears.
         self.hears: list[AirLink] = []
+        self.heeded: set[str] = set()
         own = mission.parameters_of(name)
         self.tau = own.silence_timeout
         #: Of its announcements, and of them as they come: see `air.Speaker`.
@@ -203,6 +204,10 @@ class Member:
         for fault, count in link.effects.items():
             self.effects[fault, link.sender] += count
 
+    def was_touched(self) -> bool:
+        """Whether a fault did anything to what came here."""
+        return bool(self.effects) or any(link.effects for link in self.hears)
+
     def total_effects(self) -> list[Effect]:
         """What faults did to what came here, over all lives."""
         total = self.effects.copy()
@@ -217,10 +222,8 @@ class Member:
             return
         self._listen(now)
         if trial > self.trial:
-            self.unsettle(now)
+            self._turn_to(None, now)
             self.trial = trial
-            self.task = None
-            self._content = None
             self._told.clear()
             self.mind.handle(TrialStarted(translate.learning(learning)), now)
             for link in self.hears:
@@ -229,6 +232,7 @@ class Member:
         for task, applicable, complete in views:
             if task in self.heard_on:
                 self._feel(task, TaskSense(applicable, complete, 0.0), now)
+        self._expect_lapse(self.mind.next_lapse(self.heeded))
 
     def _feel(self, task: str, sense: TaskSense, now: float) -> None:
         felt = sense.applicable, sense.complete
@@ -246,11 +250,22 @@ class Member:
         if self.runs:
             self._take(link, now, each=False)
             self._heed(now)
+            self._expect_lapse(self.mind.next_lapse(self.heeded))
 
-    def _listen(self, now: float, *, each: bool = False) -> None:
-        """Take in what has come until `now`: of rows of refreshes the last, or `each`."""
+    def doubt(self, instant: float) -> None:
+        """See `air.Hearer`."""
+        if self.runs:
+            self._expect_lapse(instant)
+
+    def _expect_lapse(self, instant: float) -> None:
+        if not self._every_step and (step := self._step_from(instant)) < self._lapse_step:
+            self._lapse_step = step
+            self._schedule()
+
+    def _listen(self, now: float, *, each: bool = False, to_all: bool = True) -> None:
+        """Take in what has come until `now`: of rows of refreshes the last, or `each`; `to_all`, or to whom nobody heeds."""
         for link in self.hears:
-            if link.waiting or link.settled:
+            if (link.settled and to_all) or link.waiting:
                 self._take(link, now, each=each)
         self._heed(now)
 
@@ -295,11 +310,13 @@ class Member:
         whole = step >= self._wake_step
         if not whole and step >= self._lapse_step:
             self._step = step
-            self._listen(now)
-            self._lapse_step = self._step_from(mind.next_lapse())
+            self._listen(now, to_all=False)
+            self._lapse_step = self._step_from(mind.next_lapse(self.heeded))
             whole = step >= self._lapse_step or step >= self._wake_step
         if whole or (step >= self._beat_step and not self._settled):
-            self.unsettle(now)
+            self.catch_up(now)
+            if step >= self._beat_step:
+                self.unsettle(now)
             if not self._after_pause:
                 mind.rest(self._instant(step - 1))
             self._after_pause = False
@@ -308,29 +325,28 @@ class Member:
                 self._listen(now)
                 self._think(now)
             else:
-                self._beat(step)
+                self._beat(now)
             if mind.broadcast_due != self._broadcast_due or self._beat_step <= step:
                 self._broadcast_due = mind.broadcast_due
                 self._beat_step = self._next_beat(step + 1)
             self._settle()
         self._schedule()
 
-    def _beat(self, step: int) -> None:
+    def _beat(self, now: float) -> None:
         self.beats += 1
-        now = self._instant(step)
         self._perform(self.mind.beat(now), now)
 
     def _settle(self) -> None:
         """See whether anybody waits for the next announcement."""
         content = self._content
-        if content is None or self._delay >= self._period:
+        if self._settled or content is None or self._delay > self._period / 2:
             return
         if all(link.can_settle(content) for link in self._audience):
             self._settled = True
             self._row = self._seq + 1
             self.unmade = self._instant(self._beat_step) + self._delay
             for link in self._audience:
-                link.settled = True
+                link.settle()
 
     def unsettle(self, now: float) -> None:
         """See `air.Speaker`."""
@@ -341,9 +357,13 @@ class Member:
             link.unsettle()
         self._settled = False
         self.latest, self.unmade = None, math.inf
-        while self._instant(self._beat_step) < now:  # what is still under way
-            self._beat(self._beat_step)
-            self._beat_step = self._next_beat(self._beat_step + 1)
+        under_way = self._beat_step
+        if self._instant(under_way) < now:
+            self.mind.rest(self._instant(under_way - 1))
+            self._beat(self._instant(under_way))
+            self._step = max(self._step, under_way + 1)
+            self._beat_step = self._next_beat(under_way + 1)
+            self._broadcast_due = self.mind.broadcast_due
         self._schedule()
 
     def catch_up(self, now: float) -> None:
@@ -381,7 +401,7 @@ class Member:
         else:
             self._wanted = self.mind.wake()
             self._wake_step = self._step_from(self._wanted)
-            self._lapse_step = self._step_from(self.mind.next_lapse())
+            self._lapse_step = self._step_from(self.mind.next_lapse(self.heeded))
 
     def _next_beat(self, step: int) -> int:
         """The first step from `step` on at which an announcement is due, if all steps are made."""
@@ -397,13 +417,17 @@ class Member:
                 case Announce():
                     self._announce(command, now)
                 case Activate():
-                    self.task = command.decision.task
-                    self._content = None
+                    self._turn_to(command.decision.task, now)
                     self._decided(self, command.decision)
                 case Deactivate():
-                    self.task = None
-                    self._content = None
+                    self._turn_to(None, now)
                     self._decided(self, command.decision)
+
+    def _turn_to(self, task: str | None, now: float) -> None:
+        """Be on another task, or on none: what is said from now on is news."""
+        self.unsettle(now)
+        self.task = task
+        self._content = None
 
     def _announce(self, said: Announce, now: float) -> None:
         self.sent += 1

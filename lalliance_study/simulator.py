@@ -329,6 +329,8 @@ class Simulator:
             for member in self.members.values():
                 member.take_stock(self.now)
         for member in self.members.values():
+            if not final and not member.was_touched():
+                continue
             effects = member.total_effects()
             touched = sum(effect.count for effect in effects)
             if final or touched > self._reported.get(member.name, 0):

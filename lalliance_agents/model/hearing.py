@@ -13,7 +13,7 @@ from lalliance_agents.model.equations import in_window
 from lalliance_agents.model.parameters import EARLY
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Contact:
     """One teammate heard on one task during this trial. Instants are the hearer's own."""
 
@@ -114,6 +114,13 @@ class Hearing:
         contact.expected = expected
         self.presences[robot].contact = contact
 
+    def watch(self, task: str, *, on: bool) -> None:
+        """From now on it matters who ceases to be heard on `task`, or, as the task is complete, does not."""
+        contacts = self.contacts(task)
+        self._lasting = [contact for contact in self._lasting if contact not in contacts]
+        if on:
+            self._lasting += [contact for contact in contacts if contact.lapsed_at is None]
+
     def has_heard(self, robots: frozenset[str]) -> bool:
         """Whether each of `robots` was heard in this trial."""
         return robots <= self.presences.keys()
@@ -197,14 +204,20 @@ class Hearing:
                 contact.lapsed_at = now
         self._lasting = [contact for contact in self._lasting if contact.lapsed_at is None]
 
-    def next_lapse(self) -> float:
-        """The earliest instant at which a step may find that somebody has ceased to be heard, there or on a task."""
+    def next_lapse(self, heeded: Collection[str] = ()) -> float:
+        """The earliest instant at which a step may find that somebody has ceased to be heard, there or on a task.
+
+        Args:
+            heeded: teammates that are known to go on with what they said last.
+        """
         last = math.inf
-        for presence in self.presences.values():
-            if presence.last < last and not presence.absent:
+        for robot, presence in self.presences.items():
+            if presence.last < last and not presence.absent and robot not in heeded:
                 last = presence.last
         for contact in self._lasting:
-            if contact.last < last:  # noqa: PLR1730 - this is asked for at every step, and `min` costs thrice as much
+            if contact.last < last and not (
+                contact.robot in heeded and self.presences[contact.robot].contact is contact
+            ):
                 last = contact.last
         return last + self._tau - EARLY
 

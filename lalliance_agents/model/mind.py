@@ -12,7 +12,7 @@ the mind decides and says is then the same, to the last bit.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from lalliance_agents.model import equations
 from lalliance_agents.model.appraisal import Appraisal, Moment
@@ -116,11 +116,12 @@ class Mind:
         return [task for task, one in self._sets.items() if one.active_since is not None]
 
     def factors(self) -> dict[str, Factors]:
-        """What produced each motivation at the last tick; of sets that another one suppressed, looked up only now."""
+        """What produced each motivation at the last tick; of sets that could not but be 0, looked up only now."""
         if self._moment is None:
             return {}
+        busy = bool(self.active)
         return {
-            task: one.factors or self._appraise(one, self._moment, suppressed=True) for task, one in self._sets.items()
+            task: one.factors or self._appraise(one, self._moment, suppressed=busy) for task, one in self._sets.items()
         }
 
     def handle(self, event: Event, now: float) -> None:
@@ -184,6 +185,8 @@ class Mind:
             monitor.completed(now)
         elif not event.applicable and one.applicable:
             monitor.interrupted(now)
+        if event.complete != one.complete:
+            self.hearing.watch(event.task, on=not event.complete)
         one.complete, one.applicable = event.complete, event.applicable
 
     def tick(self, now: float) -> list[Command]:
@@ -195,10 +198,9 @@ class Mind:
         commands, self._pending = self._pending, []
         working = self.active
         moment = self._moment = self._moment_at(now, before, working)
-        busy = bool(working) and self._suppresses
         for one in self._sets.values():
-            if busy and one.active_since is None:
-                one.suppress(now)
+            if self._suppresses and one.active_since is None and (working or one.sensory_feedback == 0):
+                one.keep_down(now)
                 continue
             suppressed = bool(working) and working != [one.task]
             factors = self._appraise(one, moment, suppressed=suppressed)
@@ -237,12 +239,15 @@ class Mind:
         changes += [self._outlook.next_change(self._sets[task], now) for task in working or self._sets]
         return min(changes, default=math.inf)
 
-    def next_lapse(self) -> float:
+    def next_lapse(self, heeded: Collection[str] = ()) -> float:
         """The earliest instant at which a tick may find somebody silent that was not; cheap, and moved by each message.
 
         It may be early, never late, for what has been handed in; see `is_refresh` for what may be held back till now.
+
+        Args:
+            heeded: teammates of whom the driver knows that they go on with what they said last.
         """
-        return self.hearing.next_lapse()
+        return self.hearing.next_lapse(heeded)
 
     def rest(self, until: float) -> None:
         """The steps up to and including `until`, at which nothing was to be done, were left out; none is undone."""
