@@ -43,8 +43,8 @@ class Hearer(Protocol):
     heeded: set[str]
     """The teammates on settled links: they cannot fall silent unnoticed."""
 
-    def doubt(self, instant: float) -> None:
-        """A teammate that was heeded may fall silent, but not before `instant`."""
+    def doubt(self, instant: float, now: float) -> None:
+        """A teammate that was heeded until `now` may fall silent, but not before `instant`."""
 
     @property
     def runs(self) -> bool:
@@ -176,7 +176,7 @@ class AirLink:
         if self.hearer.there:
             self.hearer.heeded.add(self.sender)
 
-    def unsettle(self) -> None:
+    def unsettle(self, now: float) -> None:
         """Have what has come, and was not taken, wait like everything else."""
         self.settled = False
         latest = self.speaker.latest
@@ -187,7 +187,7 @@ class AirLink:
             if self._is_new(latest):
                 self.waiting.append(latest)
         self.hearer.heeded.discard(self.sender)
-        self.hearer.doubt(self._latest + self.hearer.tau - EARLY)
+        self.hearer.doubt(self._latest + self.hearer.tau - EARLY, now)
 
     def _is_new(self, spoken: Spoken) -> bool:
         return (spoken.incarnation, spoken.seq) > (self._incarnation, self._seq)

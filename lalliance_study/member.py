@@ -15,13 +15,14 @@ from lalliance_agents.agent import translate
 from lalliance_agents.agent.behavior import TaskSense
 from lalliance_agents.agent.briefing import new_mind, roster, tasks_of
 from lalliance_agents.config import Mission
-from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, Heard, TrialStarted
+from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, TrialStarted
 from lalliance_agents.model.mind import Mind
 from lalliance_agents.model.outlook import AT_ONCE
 from lalliance_agents.model.parameters import SLACK
 from lalliance_agents.wire.messages import Effect
-from lalliance_study.air import AirLink, Spoken
+from lalliance_study.air import AirLink
 from lalliance_study.circumstances import Circumstances
+from lalliance_study.voice import NEVER, Grid, Voice
 
 
 class Process(Enum):
@@ -71,19 +72,19 @@ class Member:
         self.there = False
         self.incarnation = 0
         self.trial = 0
-        self.sent = self.steps = self.beats = 0
-        #: Links to those who hear it on a task, and idle.
-        self.heard_on: dict[str, list[AirLink]] = {task: [] for task in self.tasks}
-        self.heard_idle: list[AirLink] = []
+        self.steps = 0
         #: Links from those whom it hears.
         self.hears: list[AirLink] = []
         self.heeded: set[str] = set()
         own = mission.parameters_of(name)
         self.tau = own.silence_timeout
-        #: Of its announcements, and of them as they come: see `air.Speaker`.
-        self.longest_gap = own.broadcast_period + 2 * mission.control_period
-        self.latest: Spoken | None = None
-        self.unmade = math.inf
+        self.voice = Voice(
+            name,
+            longest_gap=own.broadcast_period + 2 * mission.control_period,
+            delay=message_delay,
+            rescheduled=self._schedule,
+        )
+        self.voice.on = {task: [] for task in self.tasks}
         #: The instant of its next control step, in seconds; infinite while there is none.
         self.due = math.inf
         self.task: str | None = None
@@ -91,21 +92,16 @@ class Member:
         self.effects: Counter[tuple[str, str]] = Counter()
         self._mission = mission
         self._circumstances = circumstances
-        self._delay = message_delay
         self._every_step = every_step
         self._decided = decided
         self._rescheduled = rescheduled
         self._sensed = sensed
-        self._period = mission.control_period
         self._mind: Mind | None = None
         self.stopped_at = 0.0
         self._lived = self._missed = 0
         #: Whether the bus has given it up since it was stopped.
         self.given_up = False
         self._told: dict[str, tuple[bool, bool]] = {}
-        self._settled = False
-        #: The links to those who hear what it says now.
-        self._audience: list[AirLink] = []
 
     def __repr__(self) -> str:
         return f"<Member {self.name}: {self.process.value}, {self.task or 'idle'}, trial {self.trial}>"
@@ -136,15 +132,14 @@ class Member:
         self.trial = 0
         self.task = None
         self._told.clear()
-        self._seq = 0
-        self._content: object = None
         self._step = 0  # the control steps made or left out so far
-        self._first = now + chance.random() * self._period
+        period = self._mission.control_period
+        self._grid = Grid(now + chance.random() * period, period)
+        self.voice.begin(self._mind, self._grid, self.incarnation, now)
         self._after_pause = True
         self._missed = 0
-        self._wake_step = self._lapse_step = self._beat_step = 0
+        self._wake_step = self._lapse_step = 0
         self._wanted = AT_ONCE
-        self._broadcast_due = now
         self._schedule()
 
     def periods(self, now: float) -> int:
@@ -152,12 +147,12 @@ class Member:
         return self._lived + (self._periods_here(now) if self.runs else 0)
 
     def _periods_here(self, now: float) -> int:
-        return max(int((now - self._first) / self._period) + 1 - self._missed, 0)
+        return max(int((now - self._grid.first) / self._grid.period) + 1 - self._missed, 0)
 
     def kill(self, now: float) -> None:
         """End as by SIGKILL."""
-        self.unsettle(now)
         if self.runs:
+            self.take_stock(now)
             self._lived += self._periods_here(now)
         self.process = Process.GONE
         self.there = False
@@ -169,14 +164,14 @@ class Member:
         """Stop as by SIGSTOP."""
         if self.runs:
             self._listen(now)  # what has come until now is heard, also if it was to be looked at later
-            self.unsettle(now)
+            self.voice.unsettle(now)
             for link in self.hears:
                 link.speaker.unsettle(now)
             self.process = Process.STOPPED
             self.stopped_at = now
             self.given_up = False
             # The steps before were made, if only in effect.
-            self.mind.rest(self._instant(self._step_from(now) - 1))
+            self.mind.rest(self._grid.instant(self._step_from(now) - 1))
             self._schedule()
 
     def resume(self, now: float) -> bool:
@@ -189,12 +184,12 @@ class Member:
             if lost:
                 link.waiting.clear()
                 link.forget(now)
-        self._step = max(math.ceil((now - self._first) / self._period - SLACK), self._step)
-        self._missed += int((now - self.stopped_at) / self._period)
+        self._step = max(math.ceil((now - self._grid.first) / self._grid.period - SLACK), self._step)
+        self._missed += int((now - self.stopped_at) / self._grid.period)
         self._after_pause = True
         self._wake_step = self._step
         self._lapse_step = max(self._lapse_step, self._step)
-        self._beat_step = max(self._beat_step, self._step)
+        self.voice.wait_until(self._step)
         if not lost:
             self._listen(now, each=True)  # no news was looked at meanwhile: any of them may be some
         self._schedule()
@@ -203,10 +198,6 @@ class Member:
     def _keep(self, link: AirLink) -> None:
         for fault, count in link.effects.items():
             self.effects[fault, link.sender] += count
-
-    def was_touched(self) -> bool:
-        """Whether a fault did anything to what came here."""
-        return bool(self.effects) or any(link.effects for link in self.hears)
 
     def total_effects(self) -> list[Effect]:
         """What faults did to what came here, over all lives."""
@@ -222,17 +213,18 @@ class Member:
             return
         self._listen(now)
         if trial > self.trial:
-            self._turn_to(None, now)
             self.trial = trial
+            self.task = None
+            self.voice.turn(now, trial)
             self._told.clear()
             self.mind.handle(TrialStarted(translate.learning(learning)), now)
             for link in self.hears:
                 link.forget(now)
             self._heed(now)
         for task, applicable, complete in views:
-            if task in self.heard_on:
+            if task in self.voice.on:
                 self._feel(task, TaskSense(applicable, complete, 0.0), now)
-        self._expect_lapse(self.mind.next_lapse(self.heeded))
+        self._expect_lapse(self.mind.next_lapse(self.heeded), now)
 
     def _feel(self, task: str, sense: TaskSense, now: float) -> None:
         felt = sense.applicable, sense.complete
@@ -250,15 +242,15 @@ class Member:
         if self.runs:
             self._take(link, now, each=False)
             self._heed(now)
-            self._expect_lapse(self.mind.next_lapse(self.heeded))
+            self._expect_lapse(self.mind.next_lapse(self.heeded), now)
 
-    def doubt(self, instant: float) -> None:
+    def doubt(self, instant: float, now: float) -> None:
         """See `air.Hearer`."""
         if self.runs:
-            self._expect_lapse(instant)
+            self._expect_lapse(instant, now)
 
-    def _expect_lapse(self, instant: float) -> None:
-        if not self._every_step and (step := self._step_from(instant)) < self._lapse_step:
+    def _expect_lapse(self, instant: float, now: float) -> None:
+        if not self._every_step and (step := self._step_from(max(instant, now))) < self._lapse_step:
             self._lapse_step = step
             self._schedule()
 
@@ -270,22 +262,15 @@ class Member:
         self._heed(now)
 
     def _take(self, link: AirLink, now: float, *, each: bool) -> None:
-        for spoken in link.take(now, each=each or self._every_step):
-            self.mind.handle(spoken.heard, spoken.arrives)
-
-    def _instant(self, step: int) -> float:
-        return self._first + step * self._period
+        taken = link.take(now, each=each or self._every_step)
+        if taken:
+            mind = self.mind
+            for spoken in taken:
+                mind.handle(spoken.heard, spoken.arrives)
 
     def _step_from(self, instant: float) -> int:
         """The first control step that is not before `instant` and still to come."""
-        if instant == math.inf:
-            return NEVER
-        if instant <= self._instant(self._step):
-            return self._step
-        step = max(math.ceil((instant - self._first) / self._period - SLACK), self._step)
-        while self._instant(step) < instant:
-            step += 1
-        return step if self._instant(step - 1) < instant else step - 1
+        return self._grid.step_from(instant, self._step)
 
     def _heed(self, now: float) -> None:
         """Make a whole step when the mind wants one, after it has perceived something."""
@@ -298,8 +283,8 @@ class Member:
                 self._schedule()
 
     def _schedule(self) -> None:
-        self._next = min(self._wake_step, self._lapse_step, NEVER if self._settled else self._beat_step)
-        due = self._first + self._next * self._period if self.runs else math.inf
+        self._next = min(self._wake_step, self._lapse_step, self.voice.due_step)
+        due = self._grid.instant(self._next) if self.runs else math.inf
         if due != self.due:
             self.due = due
             self._rescheduled(self)
@@ -313,83 +298,24 @@ class Member:
             self._listen(now, to_all=False)
             self._lapse_step = self._step_from(mind.next_lapse(self.heeded))
             whole = step >= self._lapse_step or step >= self._wake_step
-        if whole or (step >= self._beat_step and not self._settled):
-            self.catch_up(now)
-            if step >= self._beat_step:
-                self.unsettle(now)
+        if whole or step >= self.voice.due_step:
+            self.voice.prepare(step, now)
             if not self._after_pause:
-                mind.rest(self._instant(step - 1))
+                mind.rest(self._grid.instant(step - 1))
             self._after_pause = False
             self._step = step + 1
             if whole:
                 self._listen(now)
                 self._think(now)
             else:
-                self._beat(now)
-            if mind.broadcast_due != self._broadcast_due or self._beat_step <= step:
-                self._broadcast_due = mind.broadcast_due
-                self._beat_step = self._next_beat(step + 1)
-            self._settle()
+                self.voice.beat(now)
+            self.voice.made(step)
         self._schedule()
-
-    def _beat(self, now: float) -> None:
-        self.beats += 1
-        self._perform(self.mind.beat(now), now)
-
-    def _settle(self) -> None:
-        """See whether anybody waits for the next announcement."""
-        content = self._content
-        if self._settled or content is None or self._delay > self._period / 2:
-            return
-        if all(link.can_settle(content) for link in self._audience):
-            self._settled = True
-            self._row = self._seq + 1
-            self.unmade = self._instant(self._beat_step) + self._delay
-            for link in self._audience:
-                link.settle()
-
-    def unsettle(self, now: float) -> None:
-        """See `air.Speaker`."""
-        if not self._settled:
-            return
-        self.catch_up(now)
-        for link in self._audience:
-            link.unsettle()
-        self._settled = False
-        self.latest, self.unmade = None, math.inf
-        under_way = self._beat_step
-        if self._instant(under_way) < now:
-            self.mind.rest(self._instant(under_way - 1))
-            self._beat(self._instant(under_way))
-            self._step = max(self._step, under_way + 1)
-            self._beat_step = self._next_beat(under_way + 1)
-            self._broadcast_due = self.mind.broadcast_due
-        self._schedule()
-
-    def catch_up(self, now: float) -> None:
-        """See `air.Speaker`."""
-        if now < self.unmade:
-            return
-        mind, before, made = self.mind, self._seq, self._beat_step
-        while self.unmade <= now:
-            made = self._beat_step
-            mind.keep_beat(self._instant(made))
-            self._seq += 1
-            self._beat_step = self._next_beat(made + 1)
-            self.unmade = self._instant(self._beat_step) + self._delay
-        self._broadcast_due = mind.broadcast_due
-        self._step = max(self._step, made + 1)
-        self.beats += self._seq - before
-        self.sent += self._seq - before
-        at = self._instant(made)
-        mind.rest(at)
-        for said in mind.announcement(at):
-            self.latest = self._spoken(said, at, self._row)
 
     def take_stock(self, now: float) -> None:
         """Make and take in all that has come until `now`, so that it is counted."""
         if self.runs:
-            self.unsettle(now)
+            self.voice.unsettle(now)
             self._listen(now)
 
     def _think(self, now: float) -> None:
@@ -403,46 +329,12 @@ class Member:
             self._wake_step = self._step_from(self._wanted)
             self._lapse_step = self._step_from(self.mind.next_lapse(self.heeded))
 
-    def _next_beat(self, step: int) -> int:
-        """The first step from `step` on at which an announcement is due, if all steps are made."""
-        before, is_due = self._instant(step - 1), self.mind.is_broadcast_due
-        while not is_due(now := self._instant(step), before):
-            before = now
-            step += 1
-        return step
-
     def _perform(self, commands: list[Command], now: float) -> None:
         for command in commands:
             match command:
                 case Announce():
-                    self._announce(command, now)
-                case Activate():
-                    self._turn_to(command.decision.task, now)
+                    self.voice.announce(command, now)
+                case Activate() | Deactivate():
+                    self.task = command.decision.task if isinstance(command, Activate) else None
+                    self.voice.turn(now)
                     self._decided(self, command.decision)
-                case Deactivate():
-                    self._turn_to(None, now)
-                    self._decided(self, command.decision)
-
-    def _turn_to(self, task: str | None, now: float) -> None:
-        """Be on another task, or on none: what is said from now on is news."""
-        self.unsettle(now)
-        self.task = task
-        self._content = None
-
-    def _announce(self, said: Announce, now: float) -> None:
-        self.sent += 1
-        self._seq += 1
-        if self._content is None:
-            self._content = object()
-            self._audience = self.heard_idle if said.task is None else self.heard_on[said.task]
-        spoken = self._spoken(said, now)
-        for link in self._audience:
-            link.send(spoken)
-
-    def _spoken(self, said: Announce, now: float, first: int | None = None) -> Spoken:
-        heard = Heard(self.name, said.task, said.active_for, said.expected)
-        return Spoken(now + self._delay, self.incarnation, self._seq, self.trial, self._content, heard, first)
-
-
-#: The number of a control step that is never made.
-NEVER = 2**62

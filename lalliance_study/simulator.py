@@ -80,10 +80,13 @@ class Simulator:
         self._look_at = math.inf
         self._looked = -1
         self._seen: dict[str, tuple[int, bool, bool]] = {}
+        self._published: tuple[int, list[tuple[str, bool, bool]]] = 0, []
         self._late: set[str] = set()
         self._blind: dict[str, tuple[str, float | None]] = {}
         #: Of robots whose senses were held back: when what they know of each task was said.
         self._tardy: dict[str, dict[str, float]] = {}
+        #: Whether a fault may have done something to what robots hear or sense.
+        self._disturbed = False
         self._served: set[int] = set()
         self._actions: dict[str, Action] = {}
         self._reported: dict[str, int] = {}
@@ -99,13 +102,13 @@ class Simulator:
         for name, member in self.members.items():
             for mate in self.mission.teammates(name):
                 hearer = self.members[mate]
-                link = AirLink(member, hearer, self._announce_news, every_step=every_step)
+                link = AirLink(member.voice, hearer, self._announce_news, every_step=every_step)
                 links.append(link)
                 hearer.hears.append(link)
-                member.heard_idle.append(link)
+                member.voice.idle.append(link)
                 for task in member.tasks:
-                    if task in hearer.heard_on:
-                        member.heard_on[task].append(link)
+                    if task in hearer.tasks:
+                        member.voice.on[task].append(link)
         return links
 
     def _announce_news(self, link: AirLink, at: float) -> None:
@@ -115,6 +118,8 @@ class Simulator:
         self.members[link.hearer.name].news(link, self.now)
 
     def _at(self, instant: float, priority: int, deed: Callable[..., None], *arguments: Any) -> None:
+        if instant < self.now:
+            raise ValueError(f"{deed.__name__} was asked for at {instant!r} s, and it is {self.now!r} s")
         self._serial += 1
         heapq.heappush(self._heap, (instant, priority, self._serial, deed, arguments))
 
@@ -310,7 +315,8 @@ class Simulator:
                     before = self._action(member)
                 self.world.act(before, self.now)
                 self._mishaps.look(member.name, self.now)
-        self._report(final=False)
+        if self._disturbed:
+            self._report(final=False)
         for name in list(self._late):
             # Senses that come late are refreshed all the same, and the refresh comes late.
             held_back = name in self._blind and self._blind[name][1] is None
@@ -329,8 +335,6 @@ class Simulator:
             for member in self.members.values():
                 member.take_stock(self.now)
         for member in self.members.values():
-            if not final and not member.was_touched():
-                continue
             effects = member.total_effects()
             touched = sum(effect.count for effect in effects)
             if final or touched > self._reported.get(member.name, 0):
@@ -351,7 +355,7 @@ class Simulator:
             incarnation=1,
             seq=self._seq,
             at=self.now,
-            sent=member.sent,
+            sent=member.voice.sent,
             received=sum(link.received for link in member.hears),
             dropped={reason: count for reason, count in dropped.items() if count},
             teammates={},
@@ -396,20 +400,25 @@ class Simulator:
         if self._rules is None or self._rules.rules != tuple(rules):
             self._rules = LinkRules(self.mission.seed, rules)
             for member in self.members.values():
-                member.unsettle(self.now)
+                member.voice.unsettle(self.now)
             for link in self._links:
                 link.rule = self._rules.on(link.sender, link.hearer.name)
         blind = {one.robot: (one.fault, one.delay) for one in self.world.blind()}
         self._late |= self._blind.keys() - blind.keys()
         self._blind = blind
+        self._disturbed = self._disturbed or bool(rules or blind)
 
     def _publish(self) -> None:
         if self.world.trial == 0 or self.world.over:
             return
-        changed = [view for view in self._whole_view()[2] if self._is_new(view)]
+        trial, _, views = self._whole_view()
+        if (trial, views) == self._published:
+            return
+        self._published = trial, views
+        changed = [view for view in views if self._is_new(view)]
         if changed:
             for name, member in self.members.items():
-                mine = [view for view in changed if view[0] in member.heard_on]
+                mine = [view for view in changed if view[0] in member.tasks]
                 if mine:
                     self._soon(self._sense, name, (self.world.trial, self.world.learning, mine))
 

@@ -381,7 +381,7 @@ class Mind:
         half_a_step = (now - before) / 2
         return now >= self._broadcast_due - half_a_step - SLACK
 
-    def beat(self, now: float) -> list[Command]:
+    def beat(self, now: float) -> list[Announce]:
         """A step at `now` that does no more than a tick with nothing to decide: announce what is due."""
         before, self._before = self._before, now
         self.hearing.note_checked(now)
@@ -399,7 +399,7 @@ class Mind:
             return [Announce(one.task, one.active_for(now), one.expected)]
         return [Announce(None)] if self._beats else []
 
-    def _announce(self, now: float, before: float, *, urgent: bool) -> list[Command]:
+    def _announce(self, now: float, before: float, *, urgent: bool) -> list[Announce]:
         """Broadcast at rate rho, by the tick nearest to the instant due, and at once on activation."""
         if urgent:
             self._broadcast_due = now + self._broadcast_period
@@ -407,4 +407,4 @@ class Mind:
             self.keep_beat(now)
         else:
             return []
-        return [*self.announcement(now)]
+        return self.announcement(now)
