@@ -99,16 +99,18 @@ class Mind:
         return f"<Mind {self.me}: {', '.join(self.active) or 'idle'}, {len(self._sets)} sets>"
 
     def _begin_trial(self, learning: Learning, now: float) -> None:
-        self._learning = learning
-        self._born = now
-        self._waiting = self._beats
-        self._idle_since = now
         for one in self._sets.values():
             if one.active:
+                factors = self._appraise(one, self._moment_at(now, self._before, self.active), suppressed=False)
+                one.factors = factors.having(one.value(now))
                 self._pending.append(Deactivate(self._stop(one, now, Cause.NEW_TRIAL, None)))
             self._sets[one.task] = Motivation(one.task, self._draw(), since=now)
             self.knowledge.monitors[one.task].new_trial()
         self.hearing.forget()
+        self._learning = learning
+        self._born = now
+        self._waiting = self._beats
+        self._idle_since = now
 
     @property
     def active(self) -> list[str]:
@@ -211,8 +213,8 @@ class Mind:
                 self._grow(one, factors, moment)
         activations = self._activate(now)
         any_news = self.hearing.note_checked()
-        at_rest = not (commands or activations or any_news or self._outlook.restless)
-        self._wake = None if at_rest else AT_ONCE
+        undecided = activations and self._task_alone() is None
+        self._wake = AT_ONCE if commands or undecided or any_news or self._outlook.restless else None
         return commands + activations + self._announce(now, before, urgent=bool(activations))
 
     def wake(self) -> float:
