@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import ConfigDict, Field, GetPydanticSchema, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError, core_schema, to_json
 
+from lalliance_agents.errors import exact
 from lalliance_agents.fault_checks import contradiction, misfit
 from lalliance_agents.faults import AnyFault, Crash, Fault, Hang, robot_of
 from lalliance_agents.model.parameters import Architecture, Learning, NotNegative, Parameters, Positive, Record
@@ -180,7 +181,8 @@ class Mission(Record):
     def _check_before_deadline(self, instant: float, path: tuple[str | int, ...]) -> None:
         if instant >= self.deadline:
             raise misplaced(
-                path, f"{instant:g} s is not before the mission's deadline; expected less than {self.deadline:g} s"
+                path,
+                f"{exact(instant)} s is not before the mission's deadline; expected less than {exact(self.deadline)} s",
             )
 
     def _check_rates(self) -> None:
@@ -189,8 +191,8 @@ class Mission(Record):
             if own.broadcast_period < self.control_period * (1 - 1e-9):
                 raise misplaced(
                     self._where(name, "broadcast_rate"),
-                    f"robot {name} cannot send {own.broadcast_rate:g} messages/s with a control_period of "
-                    f"{self.control_period:g} s; expected at most {1 / self.control_period:g}",
+                    f"robot {name} cannot send {exact(own.broadcast_rate)} messages/s with a control_period of "
+                    f"{exact(self.control_period)} s; expected at most {1 / self.control_period:g}",
                 )
             for teammate in self.teammates(name):
                 theirs = self.parameters_of(teammate)
@@ -232,7 +234,10 @@ class Mission(Record):
         wrong = misfit(fault, self.robots, lambda robot: self.robots[robot].tasks, like)
         robot = robot_of(fault)
         if wrong is None and robot is not None and fault.at < (joins := self.robots[robot].joins):
-            return ("at",), f"at {fault.at:g} s robot {robot} is not there; expected not before it joins, {joins:g} s"
+            sentence = (
+                f"at {exact(fault.at)} s robot {robot} is not there; expected not before it joins, {exact(joins)} s"
+            )
+            return ("at",), sentence
         return wrong
 
     def _check_live_trial(self) -> None:
@@ -295,8 +300,9 @@ class Mission(Record):
         for task in self.tasks:
             fastest = min(self.robots[robot].tasks[task] for robot in self.able(task))
             if fastest > self.deadline:
+                deadline = exact(self.deadline)
                 found.append(
-                    f"tasks.{task}: its fastest robot needs {fastest:g} s, longer than the deadline of {self.deadline:g} s"
+                    f"tasks.{task}: its fastest robot needs {exact(fastest)} s, longer than the deadline of {deadline} s"
                 )
         for index, fault in enumerate(self.faults):
             if only := self._last_able(fault):
