@@ -273,6 +273,10 @@ ADDED = {
     "faults: [{at: 3, link: {}, delay: {unifrm: [1, 2]}}]": "faults.0.delay.unifrm: unknown field; did you mean 'uniform'?",
     "faults: [{at: 3, link: {}, loss: 0.5}, {at: 5, link: {to: r2}, loss: 0.3}]": "faults.1: another rule sets loss from r1 "
     "to r2 at the same time; expected one of them (see faults.0)",
+    "faults: [{at: 3, link: {from: r1, to: r1}, loss: 0.5}]": "faults.0.link: r1 is the only robot at both ends, and none "
+    "hears itself; expected two different robots",
+    "faults: [{at: 3, link: {from: '*1', to: [r1, '?1'], both: true}, cut: true}]": "faults.0.link: r1 is the only robot at "
+    "both ends, and none hears itself; expected two different robots",
     "faults: [{at: 3, link: {from: []}, loss: 0.5}]": "faults.0.link.from: [] is not allowed; expected 1 or more entries",
     "faults: [{at: 3, link: {from: [r1, 5]}, loss: 0.5}]": "faults.0.link.from.1: 5 is a number; expected text, in quotes: "
     "'5'",
@@ -315,6 +319,14 @@ def test_a_fault_of_a_robot_that_has_not_joined(at: str) -> None:
     assert (
         sentence(text) == f"x.yaml:7: faults.0.at: at {at} s robot r2 is not there; expected not before it joins, 5 s"
     )
+
+
+def test_a_lone_robot_has_no_links() -> None:
+    text = "name: x\ntasks: {a: }\nrobots: {r1: {tasks: {a: 1}}}\nfaults: [{at: 3, link: {}, loss: 0.5}]"
+    assert sentence(text).startswith("x.yaml:4: faults.0.link: r1 is the only robot at both ends")
+    pairs = ("{from: r1, to: 'r*'}", "{from: 'r*', to: r2}", "{}")
+    for pair in pairs:
+        parse_mission(DEPOT + f"faults: [{{at: 3, link: {pair}, loss: 0.5}}]", "x.yaml")
 
 
 @pytest.mark.parametrize(("spelled", "shown"), [("1e999", ".inf"), ("-1e999", "-.inf"), ("NaN", ".nan")])

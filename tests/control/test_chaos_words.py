@@ -57,6 +57,7 @@ BAD = {
     "kind=hang robot=lifter for=1000000000001": "for: 1000000000001 is not allowed; expected a number of at most 1e+12",
     f"kind=hang robot=lifter for=1{'0' * 400}": f"for: 1{'0' * 55} ... is not allowed; expected a number of at most 1e+12",
     "kind=slow robot=lifter factor=1e999": "factor: .inf is not allowed; expected a finite number",
+    "from=lifter to=lif* loss=1": "link: lifter is the only robot at both ends, and none hears itself",
     "from=[] loss=1": "link.from: [] is not allowed; expected 1 or more entries",
     "kind=hang kind=mute robot=lifter": "'kind=mute' is about a field that has a value already; expected it once",
     "link=1 from=lifter": "'from=lifter' is about a field that has a value already; expected it once",
