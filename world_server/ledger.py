@@ -25,6 +25,8 @@ MOST_LETTERS = 40
 #: Reasons of drops that are told apart; those of a robot that makes up more count as `OTHER_REASONS`.
 MOST_REASONS = 100
 OTHER_REASONS = "others"
+#: How an attempt ended with which its task was completed.
+COMPLETE = "complete"
 #: Of drops by hearer, sender and reason, those told apart; more are not kept.
 MOST_DROPS = 1000
 
@@ -60,7 +62,7 @@ class _Attempt:
     robot: str
     at: float
     ended: str | None = None
-    """The cause that the robot gave for its end, or `lost` if the robot was."""
+    """`complete` if the task was completed meanwhile, `lost` if the robot was; else the cause that it gave for its end."""
 
 
 @dataclass(slots=True)
@@ -99,9 +101,11 @@ class Ledger:
             self._tasks[task].attempts.append(_Attempt(robot, at))
 
     def completed(self, task: str, by: tuple[str, ...], at: float) -> None:
-        """`task` was finished by `by`."""
-        self._tasks[task].completed_at = at
-        self._tasks[task].by = by
+        """`task` was finished by `by`; that ends all attempts at it."""
+        record = self._tasks[task]
+        record.completed_at, record.by = at, by
+        for attempt in record.attempts:
+            attempt.ended = attempt.ended or COMPLETE
 
     def failed(self, robot: str, at: float) -> None:
         """`robot` ceased to be."""

@@ -57,6 +57,17 @@ def test_what_is_no_takeover() -> None:
     assert ledger.decided(activation("left", "right", "silence"), 6.0) is not None
 
 
+def test_a_completed_task_has_no_attempt_without_an_end() -> None:
+    """Whatever reports of robots are still under way when the mission ends."""
+    ledger = Ledger(["a"])
+    for robot, at in (("left", 1.0), ("right", 2.0), ("third", 3.0)):
+        ledger.began(robot, "a", at)
+    ledger.failed("left", 4.0)
+    ledger.completed("a", ("right",), 5.0)
+    ledger.decided(activation("right", None, "sensed", verb="complete"), 5.1)
+    assert [one["ended"] for one in ledger.summary()["tasks"]["a"]["attempts"]] == ["lost", "complete", "complete"]
+
+
 def test_a_robot_that_came_back_has_not_failed_and_a_new_trial_knows_of_no_failure() -> None:
     ledger = Ledger(["a"])
     ledger.failed("left", 1.0)
