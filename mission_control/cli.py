@@ -23,7 +23,7 @@ import typer
 from lalliance_agents.errors import LallianceError, UserError
 from mission_control.campaign_command import campaign
 from mission_control.chaos import chaos
-from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
+from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, ToldToEnd, end_when_told, run_until_told
 from mission_control.simulate import simulate
 
 if TYPE_CHECKING:
@@ -358,13 +358,16 @@ def main() -> None:
     """Run the command line; errors become one sentence on standard error."""
     sys.path.insert(0, str(Path.cwd()))
     try:
+        end_when_told()
         app()
     except UserError as error:
         _fail(str(error), 2)
     except LallianceError as error:
         _fail(str(error), 1)
-    except KeyboardInterrupt:
-        _fail("interrupted", 128 + signal.SIGINT)
+    except ToldToEnd as told:
+        if told.number is signal.SIGINT:
+            typer.echo("lalliance: interrupted", err=True)
+        sys.exit(128 + told.number)
     except OSError as error:
         if error.errno not in {errno.EPIPE, errno.ENOSPC}:
             raise
@@ -372,3 +375,8 @@ def main() -> None:
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    finally:
+        # What is left to do must not take long; who is asked to end now ends at once.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.SIG_DFL)

@@ -16,8 +16,35 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on
 T = TypeVar("T")
 
 
+class ToldToEnd(BaseException):
+    """This process got a signal that asks it to end; whatever is open is closed on the way.
+
+    Attributes:
+        number: which signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = signal.Signals(number)
+
+
+def _tell(number: int, _frame: object) -> None:
+    raise ToldToEnd(number)
+
+
+def end_when_told() -> None:
+    """Have SIGINT and SIGTERM raise `ToldToEnd` from now on; who is to ignore one goes on doing so."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _tell)
+
+
 def run_until_told(work: Coroutine[Any, Any, T]) -> T:
-    """Run `work`; SIGINT and SIGTERM cancel it and end the process with 128 + the signal's number."""
+    """Run `work`; SIGINT and SIGTERM cancel it.
+
+    Raises:
+        ToldToEnd: one of them came.
+    """
     told: list[int] = []
 
     async def supervised() -> T:
@@ -35,7 +62,6 @@ def run_until_told(work: Coroutine[Any, Any, T]) -> T:
     try:
         return asyncio.run(supervised())
     except asyncio.CancelledError:
-        number = signal.Signals(told[0] if told else signal.SIGTERM)
-        if number is signal.SIGINT:
-            typer.echo("lalliance: interrupted", err=True)
-        raise typer.Exit(128 + number) from None
+        raise ToldToEnd(told[0] if told else signal.SIGTERM) from None
+    finally:
+        end_when_told()
