@@ -13,7 +13,6 @@ import logging
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
@@ -310,14 +309,16 @@ def _kept(journal: Path | None) -> Iterator[Path]:
     if journal is not None:
         yield journal
         return
-    try:
-        folder = tempfile.TemporaryDirectory(prefix="lalliance-", ignore_cleanup_errors=True)
-    except OSError as error:
-        raise UserError(
-            f"no folder for temporary files ({error.strerror}); expected one that can be written to, or --journal FILE"
-        ) from error
-    with folder as name:
-        yield Path(name) / "journal"
+    from mission_control.temporary import own_folder
+
+    with contextlib.ExitStack() as open_until_then:
+        try:
+            folder = open_until_then.enter_context(own_folder())
+        except OSError as error:
+            raise UserError(
+                f"no folder for temporary files ({error.strerror}); expected one that can be written to, or --journal FILE"
+            ) from error
+        yield folder / "journal"
 
 
 def _view(mission: "Mission", console: "Console", *, plain: bool) -> "Lines":
