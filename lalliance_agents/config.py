@@ -7,19 +7,18 @@ makes of its own options is checked by the environment.
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
-from math import inf
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, GetPydanticSchema, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError, core_schema, to_json
 
 from lalliance_agents.errors import exact
-from lalliance_agents.fault_checks import contradiction, misfit
-from lalliance_agents.faults import AnyFault, Crash, Fault, Hang, robot_of
+from lalliance_agents.fault_checks import contradiction, ends_work, misfit
+from lalliance_agents.faults import AnyFault, Fault, describe, robot_of
 from lalliance_agents.model.parameters import Architecture, Learning, NotNegative, Parameters, Positive, Record
 from lalliance_agents.wire.keys import NAME_PATTERN
 
@@ -304,18 +303,30 @@ class Mission(Record):
                 found.append(
                     f"tasks.{task}: its fastest robot needs {exact(fastest)} s, longer than the deadline of {deadline} s"
                 )
-        for index, fault in enumerate(self.faults):
-            if only := self._last_able(fault):
-                found.append(
-                    f"faults.{index}: {robot_of(fault)} is the only robot for {', '.join(only)}; "
-                    "the mission cannot complete if that is still open"
-                )
-        return found
+        return [*found, *self._never_done()]
 
-    def _last_able(self, fault: Fault) -> list[str]:
-        if not isinstance(fault, Crash | Hang) or fault.end < inf:
-            return []
-        return [task for task in self.robots[fault.robot].tasks if self.able(task) == [fault.robot]]
+    def _never_done(self) -> Iterator[str]:
+        """Sentences about tasks for which no robot is left, or none is there at first."""
+        doomed: dict[str, list[str]] = {}
+        for task in self.tasks:
+            ends = [self._end_of_work(robot, task) for robot in self.able(task)]
+            if None not in ends:
+                told = " and ".join(f"{describe(fault)} at {fault.at:g} s" for fault in ends if fault is not None)
+                doomed.setdefault(told, []).append(f"tasks.{task}")
+            if sum(phase.trials for phase in self.phases) > 1 and all(
+                self.robots[robot].joins > 0 for robot in self.able(task)
+            ):
+                yield f"tasks.{task}: its robots join in the last trial; those before it cannot complete"
+        for told, tasks in doomed.items():
+            yield (
+                f"{', '.join(tasks)}: no robot is left for it after {told}; if it is still open then, the mission is not "
+                "expected to complete"
+            )
+
+    def _end_of_work(self, robot: str, task: str) -> Fault | None:
+        """The fault from which on `robot` does not work on `task` any more, if there is one."""
+        ending = [fault for fault in self.faults if robot_of(fault) == robot and ends_work(fault, task)]
+        return min(ending, key=lambda fault: fault.at, default=None)
 
 
 def like(word: str, known: Iterable[str]) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from fnmatch import fnmatchcase
 
 from lalliance_agents.faults import (
+    Blind,
     Crash,
     Fault,
     Hang,
@@ -80,6 +81,21 @@ def _between_nobody(fault: LinkFault, team: list[str]) -> tuple[Place, str] | No
         return None
     alone = next(name for name in team if _covers(fault, name, name))
     return ("link",), f"{alone} is the only robot at both ends, and none hears itself; expected two different robots"
+
+
+def ends_work(fault: Fault, task: str) -> bool:
+    """Whether from some time on its robot does not work on `task` with open eyes any more."""
+    if fault.end < math.inf:
+        return False
+    match fault:
+        case Crash() | Hang():
+            return True
+        case Blind():
+            return fault.delay is None
+        case Stuck():
+            return fault.task in {None, task}
+        case _:
+            return False
 
 
 def contradiction(fault: Fault, earlier: Fault, robots: Iterable[str]) -> str | None:

@@ -22,7 +22,16 @@ import typer
 from lalliance_agents.errors import LallianceError, UserError
 from mission_control.campaign_command import campaign
 from mission_control.chaos import chaos
-from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, ToldToEnd, end_when_told, run_until_told
+from mission_control.shell import (
+    DEFAULT_ENDPOINT,
+    AsJson,
+    MissionPath,
+    ToldToEnd,
+    end_when_told,
+    run_until_told,
+    warn,
+    warn_of,
+)
 from mission_control.simulate import simulate
 
 if TYPE_CHECKING:
@@ -102,10 +111,9 @@ def run(
         from lalliance_agents.agent.catalog import prepare
 
         prepare(learned)
-    for warning in mission.warnings():
-        _warn(f"{path}: {warning}")
+    warn_of(path, mission)
     if (real := mission.parameters.silence_timeout / speed) < SHORTEST_SILENCE:
-        _warn(
+        warn(
             f"--speed {speed:g} makes {real:.2g} real seconds of silence a failure; a busy machine may see some that are none"
         )
 
@@ -262,8 +270,7 @@ def check(path: MissionPath) -> None:
     from mission_control.summary import fault_lines
 
     mission = _load(path, None, part="team")
-    for warning in mission.warnings():
-        _warn(f"{path}: {warning}")
+    warn_of(path, mission)
     parts = {
         "robot": len(mission.robots),
         "task": len(mission.tasks),
@@ -344,10 +351,6 @@ def _show_events() -> None:
     events.addHandler(lines)
     events.setLevel(logging.INFO)
     events.propagate = False
-
-
-def _warn(text: str) -> None:
-    typer.echo(f"lalliance: warning: {text}", err=True)
 
 
 def _fail(text: str, status: int) -> NoReturn:

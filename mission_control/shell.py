@@ -4,9 +4,12 @@ import asyncio
 import signal
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
+
+if TYPE_CHECKING:
+    from lalliance_agents.config import Mission
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -14,6 +17,17 @@ MissionPath = Annotated[Path, typer.Argument(metavar="MISSION", help="The missio
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output.")]
 
 T = TypeVar("T")
+
+
+def warn(text: str) -> None:
+    """Tell something doubtful on standard error."""
+    typer.echo(f"lalliance: warning: {text}", err=True)
+
+
+def warn_of(path: Path, mission: "Mission") -> None:
+    """Tell what is doubtful in the mission in the file at `path`."""
+    for warning in mission.warnings():
+        warn(f"{path}: {warning}")
 
 
 class ToldToEnd(BaseException):

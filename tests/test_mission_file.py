@@ -321,6 +321,34 @@ def test_a_fault_of_a_robot_that_has_not_joined(at: str) -> None:
     )
 
 
+NEVER_DONE = {
+    "{at: 3, robot: r1, kind: crash}": ["tasks.a: no robot is left for it after crash of r1 at 3 s; if it"],
+    "{at: 3, robot: r1, kind: hang}": ["tasks.a: no robot is left for it after hang of r1 at 3 s; if it"],
+    "{at: 3, until: 5, robot: r1, kind: hang}": [],
+    "{at: 3, robot: r1, kind: crash, restart: true}": [],
+    "{at: 3, robot: r1, kind: stuck, task: b}": [],
+    "{at: 3, robot: r1, kind: blind, delay: 1}": [],
+    "{at: 3, robot: r2, kind: crash}": [],
+    "{at: 3, robot: r1, kind: blind}, {at: 2, robot: r1, kind: stuck}, {at: 4, robot: r2, kind: stuck, task: b}": [
+        "tasks.a: no robot is left for it after stuck of r1 at 2 s; if it",
+        "tasks.b: no robot is left for it after stuck of r1 at 2 s and stuck of r2 at b at 4 s; if it",
+    ],
+}
+
+
+@pytest.mark.parametrize("faults", NEVER_DONE)
+def test_a_task_that_faults_leave_no_robot_for_is_warned_of(faults: str) -> None:
+    mission = parse_mission(f"{DEPOT}parameters: {{max_delay: 0.3}}\nfaults: [{faults}]", "x.yaml")
+    assert [warning[: warning.index("; if it") + 7] for warning in mission.warnings()] == NEVER_DONE[faults]
+
+
+def test_a_task_without_a_robot_before_the_last_trial_is_warned_of() -> None:
+    text = DEPOT.replace("tasks: {a: 8, b: 4}", "tasks: {a: 8, b: 4}\n    joins: 3") + "parameters: {max_delay: 0.3}\n"
+    assert parse_mission(text, "x.yaml").warnings() == []
+    trained = parse_mission(text + "phases: [{learning: active}, {}]", "x.yaml")
+    assert trained.warnings() == ["tasks.a: its robots join in the last trial; those before it cannot complete"]
+
+
 def test_a_lone_robot_has_no_links() -> None:
     text = "name: x\ntasks: {a: }\nrobots: {r1: {tasks: {a: 1}}}\nfaults: [{at: 3, link: {}, loss: 0.5}]"
     assert sentence(text).startswith("x.yaml:4: faults.0.link: r1 is the only robot at both ends")
