@@ -191,3 +191,14 @@ def test_the_journal_of_a_run_that_names_none_goes_with_it(processes: Processes,
     run.send_signal(signal.SIGINT)
     run.communicate(timeout=10)
     assert list(processes.temporary.iterdir()) == []
+
+
+def test_the_journal_of_a_run_that_was_killed_goes_with_the_next_run(processes: Processes, small: Path) -> None:
+    run = processes.start("run", small, "--plain")
+    read_until(run, "left starts")
+    run.kill()
+    run.communicate(timeout=10)
+    [left] = processes.temporary.iterdir()
+    processes.run("run", small, "--plain", "--connect", free_endpoint())
+    assert not left.exists()
+    assert list(processes.temporary.iterdir()) == []
