@@ -13,7 +13,7 @@ real one sends. Each key's stream takes its numbers from one row only, in the or
 import itertools
 import logging
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from lalliance_agents.bus.base import Bus, Delivery, Registration, Sample
@@ -48,16 +48,19 @@ class Messenger:
         me: the name that goes into each header.
         incarnation: which life of `me` this is.
         clock: gives mission time, in seconds.
+        team: the robots that are told apart in the account of what was dropped.
     """
 
-    def __init__(self, bus: Bus, keys: Keys, me: str, incarnation: int, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, bus: Bus, keys: Keys, me: str, incarnation: int, clock: Callable[[], float], team: Iterable[str] = ()
+    ) -> None:
         self.bus = bus
         self.keys = keys
         self.me = me
         self.incarnation = incarnation
         self.sent = 0
         self.received = 0
-        self._drops = Drops()
+        self._drops = Drops(team)
         self._clock = clock
         self._presence_numbers = itertools.count(1)
         self._other_numbers = itertools.count(1)
@@ -152,7 +155,7 @@ class Messenger:
         self.drop(CUT_OFF, source)
         if not newest.told:
             newest.told = True
-            if self._drops.is_to_be_told("row of stale messages", source):
+            if self._drops.is_cut_off(source):
                 _log.warning(
                     "%s is cut off: for %.0f s nothing on %s is newer than its message %d of life %d, which somebody made up, "
                     "unless another process goes by this name or messages come very late; none of them is used",
