@@ -63,7 +63,7 @@ class Manifest(Record):
             ),
             scenarios=tuple(numbered(preset.experiments)),
             machine={
-                "system": platform.platform(),
+                "system": f"{platform.system()} {platform.release()}",
                 "machine": platform.machine(),
                 "processors": str(os.cpu_count()),
                 "python": platform.python_version(),

@@ -12,6 +12,8 @@ from support.processes import Processes, until
 
 from lalliance_study.experiments import rows
 from lalliance_study.experiments.manifest import FILE, Manifest
+from lalliance_study.experiments.presets import preset
+from lalliance_study.experiments.runner import open_study
 
 
 @pytest.fixture
@@ -49,10 +51,14 @@ def test_a_study_is_carried_out_once(processes: Processes) -> None:
     assert {path: path.stat().st_mtime_ns for path in (processes.folder / "out").rglob("*")} == before
 
 
-@pytest.mark.parametrize(("told", "jobs"), [(signal.SIGINT, "2"), (signal.SIGTERM, "2")])
-def test_whoever_is_told_to_end_says_how_to_go_on(processes: Processes, told: signal.Signals, jobs: str) -> None:
-    running = processes.start("study", "run", "--preset", "paper", "--out", "out", "--jobs", jobs)
-    until(lambda: len(processes.alive()) >= 3)
+@pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("processes_at_least", [2, 4])
+def test_whoever_is_told_to_end_says_how_to_go_on(
+    processes: Processes, told: signal.Signals, processes_at_least: int
+) -> None:
+    """Also while it is still starting processes."""
+    running = processes.start("study", "run", "--preset", "paper", "--out", "out", "--jobs", "2")
+    until(lambda: len(processes.alive()) >= processes_at_least)
     running.send_signal(told)
     began = time.monotonic()
     out, err = running.communicate(timeout=20)
@@ -103,9 +109,6 @@ def _defaults(arguments: list[str]) -> list[str]:
 
 
 def test_another_study_in_the_folder_is_left_alone(processes: Processes) -> None:
-    from lalliance_study.experiments.presets import preset
-    from lalliance_study.experiments.runner import open_study
-
     out = processes.folder / "out"
     open_study(out, preset("paper"), seed=1)
     before = (out / FILE).read_bytes()
