@@ -82,8 +82,8 @@ def _submit(pool: ProcessPoolExecutor, work: Callable[..., T], part: tuple[Any, 
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDS)
         for number, handler in before.items():
             signal.signal(number, handler)
-        for number in came:
-            signal.raise_signal(number)
+        for told in came:
+            signal.raise_signal(told)
 
 
 def _begin(parent: int) -> None:

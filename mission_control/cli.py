@@ -94,6 +94,7 @@ def run(
 
     from mission_control.launch import Beginning, Launcher, Plan
     from mission_control.summary import show
+    from mission_control.yardstick import with_optimum
     from world_server.history import recall
 
     if connect is not None and listen is not None:
@@ -122,6 +123,7 @@ def run(
 
     with _kept(journal) as kept:
         summary = run_until_told(launch(kept))
+    summary = with_optimum(summary, mission)
     if as_json:
         typer.echo(json.dumps(summary))
     else:
