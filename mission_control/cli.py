@@ -33,6 +33,7 @@ from mission_control.shell import (
     warn_of,
 )
 from mission_control.simulate import simulate
+from mission_control.study_command import study
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -101,6 +102,7 @@ def run(
 
     from mission_control.launch import Beginning, Launcher, Plan
     from mission_control.summary import show
+    from mission_control.yardstick import with_optimum
     from world_server.history import recall
 
     if connect is not None and listen is not None:
@@ -128,6 +130,7 @@ def run(
 
     with _kept(journal) as kept:
         summary = run_until_told(launch(kept))
+    summary = with_optimum(summary, mission)
     if as_json:
         typer.echo(json.dumps(summary))
     else:
@@ -292,6 +295,7 @@ def schema() -> None:
 
 
 app.add_typer(chaos, name="chaos")
+app.add_typer(study, name="study")
 
 
 def _load(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":
