@@ -100,7 +100,6 @@ class AirLink:
         self._task: str | None = None
         self._latest = 0.0
         self._incarnation = self._seq = -1
-        self._in_order = False
         self._can_settle = not every_step and speaker.longest_gap < hearer.tau - EARLY
         #: Whether what is said here is not made before somebody looks.
         self.settled = False
@@ -147,11 +146,9 @@ class AirLink:
         gap = arrives - self._latest
         if spoken.content is self._content and 0.0 <= gap <= self.hearer.tau - EARLY and not self._every_step:
             self._latest = arrives
-            self._in_order = True
             self.waiting.append(spoken)
             return
         self._content, self._task = spoken.content, spoken.heard.task
-        self._in_order = gap >= 0.0
         if gap >= 0.0:
             self._latest = arrives
             self.waiting.append(spoken)
@@ -163,11 +160,11 @@ class AirLink:
             self.waiting.extend(later)
         self._announce_news(self, arrives)
 
-    def can_settle(self, content: object) -> bool:
-        """Whether what the speaker goes on to say is no news to the hearer, if it has one."""
+    def can_settle(self, content: object, comes: float) -> bool:
+        """Whether what the speaker goes on to say, first what `comes` then, is no news to the hearer, if it has one."""
         if not self.hearer.there:
             return True
-        steady = self._can_settle and self._in_order and self.rule is None
+        steady = self._can_settle and self.rule is None and self._latest <= comes
         return steady and self._content is content and self.hearer.runs
 
     def settle(self) -> None:

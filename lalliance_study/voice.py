@@ -125,10 +125,11 @@ class Voice:
         content = self._content
         if self._settled or content is None or self._delay > self._grid.period / 2:
             return
-        if all(link.can_settle(content) for link in self._audience):
+        comes = self._grid.instant(self._beat_step) + self._delay
+        if all(link.can_settle(content, comes) for link in self._audience):
             self._settled = True
             self._row = self._seq + 1
-            self.unmade = self._grid.instant(self._beat_step) + self._delay
+            self.unmade = comes
             for link in self._audience:
                 link.settle()
 
