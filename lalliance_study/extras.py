@@ -3,11 +3,7 @@
 from importlib import import_module
 from types import ModuleType
 
-from lalliance_agents.errors import UserError
-
-
-class MissingExtraError(UserError):
-    """A package of the study extra is not installed."""
+from lalliance_agents.extras import extra
 
 
 def study_package(module: str) -> ModuleType:
@@ -16,10 +12,5 @@ def study_package(module: str) -> ModuleType:
     Raises:
         MissingExtraError: it is not installed.
     """
-    try:
+    with extra("study"):
         return import_module(module)
-    except ModuleNotFoundError as error:
-        raise MissingExtraError(
-            f"this needs the package {(error.name or module).partition('.')[0]}, which is not installed; "
-            "expected the study extra: pip install 'lalliance[study]'"
-        ) from None

@@ -23,7 +23,8 @@ import typer
 from lalliance_agents.errors import LallianceError, UserError
 from mission_control.campaign_command import campaign
 from mission_control.chaos import chaos
-from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
+from mission_control.deploy.keys_command import keys as keys_command
+from mission_control.shell import AsJson, Keys, MissionPath, credentials_from, endpoint_of, run_until_told
 from mission_control.simulate import simulate
 
 if TYPE_CHECKING:
@@ -48,7 +49,9 @@ Speed = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Mission second
 Seed = Annotated[
     int | None, typer.Option(min=0, max=2**63 - 1, help="All randomness; default: the mission's own seed.")
 ]
-Connect = Annotated[str, typer.Option(metavar="ENDPOINT", help="The router to connect to.")]
+Connect = Annotated[
+    str | None, typer.Option(metavar="ENDPOINT", help="The router to connect to; default: port 7447 of this machine.")
+]
 Parent = Annotated[int | None, typer.Option(hidden=True, help="End when the process with this id does.")]
 Learned = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Where robots keep what they learned; default: nowhere.")
@@ -83,6 +86,7 @@ def run(
         str | None,
         typer.Option(metavar="ENDPOINT", help="Where the router listens; default: a free port of this machine."),
     ] = None,
+    keys: Keys = None,
     learned: Learned = None,
     journal: JournalPath = None,
     plain: Annotated[bool, typer.Option("--plain", help="One line per event instead of the live view.")] = False,
@@ -103,6 +107,10 @@ def run(
         from lalliance_agents.agent.catalog import prepare
 
         prepare(learned)
+    if keys is not None:
+        from mission_control.deploy.team_keys import check_team
+
+        check_team(keys, path, mission, with_router=connect is None)
     for warning in mission.warnings():
         _warn(f"{path}: {warning}")
     if (real := mission.parameters.silence_timeout / speed) < SHORTEST_SILENCE:
@@ -111,9 +119,9 @@ def run(
         )
 
     def plan(kept: Path) -> Plan:
-        own = None if learned is None else learned.resolve()
+        own, shown = (None if folder is None else folder.resolve() for folder in (learned, keys))
         beginning = Beginning.of(recall(kept, mission))
-        return Plan(path.resolve(), mission, kept.resolve(), beginning, speed, connect, listen, own)
+        return Plan(path.resolve(), mission, kept.resolve(), beginning, speed, connect, listen, own, shown)
 
     async def launch(kept: Path) -> dict[str, Any]:
         with _view(mission, console, plain=plain) as view:
@@ -134,16 +142,21 @@ app.command()(campaign)
 
 @app.command()
 def router(
-    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen.")] = DEFAULT_ENDPOINT,
+    listen: Annotated[
+        str | None, typer.Option(metavar="ENDPOINT", help="Where to listen; default: port 7447 of this machine.")
+    ] = None,
+    keys: Keys = None,
     parent: Parent = None,
 ) -> None:
     """Run a router: where robots, world and operators of a mission meet."""
     _follow(parent)
+    endpoint = endpoint_of(listen, keys)
 
     async def serve() -> None:
+        from lalliance_agents.bus.credentials import ROUTER
         from lalliance_agents.bus.router import open_router
 
-        async with await open_router(listen) as running:
+        async with await open_router(endpoint, credentials=credentials_from(keys, ROUTER)) as running:
             typer.echo(f"router listens on {running.endpoint}")
             sys.stdout.flush()
             await asyncio.Event().wait()
@@ -154,7 +167,8 @@ def router(
 @app.command()
 def world(
     path: MissionPath,
-    connect: Connect = DEFAULT_ENDPOINT,
+    connect: Connect = None,
+    keys: Keys = None,
     speed: Speed = 1.0,
     seed: Seed = None,
     wait: Annotated[
@@ -176,11 +190,12 @@ def world(
     async def serve() -> dict[str, Any]:
         from lalliance_agents.agent.catalog import fresh_incarnation
         from lalliance_agents.bus.zenoh_bus import open_bus
+        from lalliance_agents.wire.keys import WORLD
         from world_server.journal import Journal
         from world_server.server import WorldServer
 
         with contextlib.nullcontext() if journal is None else Journal(journal, mission) as kept:
-            async with await open_bus(connect) as bus:
+            async with await open_bus(endpoint_of(connect, keys), credentials=credentials_from(keys, WORLD)) as bus:
                 server = WorldServer(
                     mission,
                     bus=bus,
@@ -208,7 +223,8 @@ def world(
 def robot(
     path: MissionPath,
     name: Annotated[str, typer.Option(help="Which robot of the mission.", show_default=False)],
-    connect: Connect = DEFAULT_ENDPOINT,
+    connect: Connect = None,
+    keys: Keys = None,
     speed: Speed = 1.0,
     seed: Seed = None,
     behaviors: Annotated[
@@ -238,9 +254,10 @@ def robot(
         place = behaviors or mission.robots[name].behaviors
         sets = load_behaviors(place) if place else []
         catalog = None if learned is None else Catalog(learned, name)
-        async with await open_bus(connect) as bus:
+        endpoint = endpoint_of(connect, keys)
+        async with await open_bus(endpoint, credentials=credentials_from(keys, name)) as bus:
             if parent is None:
-                typer.echo(f"robot {name} of mission {mission.name} is connected to {connect}")
+                typer.echo(f"robot {name} of mission {mission.name} is connected to {endpoint}")
             member = Robot(
                 mission,
                 name,
@@ -286,6 +303,7 @@ def schema() -> None:
 
 
 app.add_typer(chaos, name="chaos")
+app.add_typer(keys_command, name="keys")
 
 
 def _load(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":

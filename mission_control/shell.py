@@ -4,16 +4,50 @@ import asyncio
 import signal
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+if TYPE_CHECKING:
+    from lalliance_agents.bus.credentials import Credentials
+
+#: Where a router is that nobody named: without keys, and with them.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+SECURE_ENDPOINT = "tls/127.0.0.1:7447"
 
 MissionPath = Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file (YAML).", show_default=False)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output.")]
+Keys = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR", help="Keys of `lalliance keys init`: with them the bus is encrypted and knows who is who."
+    ),
+]
 
 T = TypeVar("T")
+
+
+def endpoint_of(given: str | None, keys: Path | None) -> str:
+    """Where the router is: the usual place if nobody says."""
+    if given is not None:
+        return given
+    return DEFAULT_ENDPOINT if keys is None else SECURE_ENDPOINT
+
+
+def credentials_from(keys: Path | None, name: str) -> "Credentials | None":
+    """The checked credentials of `name` in the folder of keys, if there is one.
+
+    Raises:
+        KeysError: they cannot be used.
+    """
+    if keys is None:
+        return None
+    from lalliance_agents.extras import extra
+
+    with extra("deploy"):
+        from lalliance_agents.bus.certificates import checked_credentials
+
+    return checked_credentials(keys, name)
 
 
 def run_until_told(work: Coroutine[Any, Any, T]) -> T:
