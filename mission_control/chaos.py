@@ -22,6 +22,7 @@ Connect = Annotated[
     str | None,
     typer.Option(
         metavar="ENDPOINT",
+        envvar="LALLIANCE_CONNECT",
         help=f"The router to connect to; default: that of the mission if it runs on this machine, else {DEFAULT_ENDPOINT}.",
     ),
 ]

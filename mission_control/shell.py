@@ -4,12 +4,13 @@ import asyncio
 import signal
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
 if TYPE_CHECKING:
     from lalliance_agents.bus.credentials import Credentials
+    from lalliance_agents.config import Mission
 
 #: Where a router is that nobody named: without keys, and with them.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -20,8 +21,22 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on
 Keys = Annotated[
     Path | None,
     typer.Option(
-        metavar="DIR", help="Keys of `lalliance keys init`: with them the bus is encrypted and knows who is who."
+        metavar="DIR",
+        envvar="LALLIANCE_KEYS",
+        help="Keys of `lalliance keys init`: with them the bus is encrypted and knows who is who.",
     ),
+]
+
+Speed = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Mission seconds per real second.")]
+Seed = Annotated[
+    int | None, typer.Option(min=0, max=2**63 - 1, help="All randomness; default: the mission's own seed.")
+]
+Learned = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Where robots keep what they learned; default: nowhere.")
+]
+JournalPath = Annotated[
+    Path | None,
+    typer.Option("--journal", metavar="FILE", help="What happens is kept there; if it is there, the mission goes on."),
 ]
 
 T = TypeVar("T")
@@ -73,3 +88,19 @@ def run_until_told(work: Coroutine[Any, Any, T]) -> T:
         if number is signal.SIGINT:
             typer.echo("lalliance: interrupted", err=True)
         raise typer.Exit(128 + number) from None
+
+
+def load_part(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":
+    """The checked mission at `path`.
+
+    Whole for a team; without the robots' own code for a world, and without the world's environment for a robot.
+    """
+    if part == "robot":
+        from lalliance_agents.mission_file import load_mission
+
+        mission = load_mission(path)
+    else:
+        from mission_control.missions import load
+
+        mission = load(path, for_team=part == "team")
+    return mission if seed is None else mission.model_copy(update={"seed": seed})

@@ -85,16 +85,18 @@ def credentials_in(keys: Path, name: str) -> Credentials:
     return Credentials(keys / _FOLDERS[name] if name in _FOLDERS else keys / "robots" / name)
 
 
-def check_secure(endpoint: str) -> None:
-    """Accept an endpoint where keys are shown.
+def check_fits(endpoint: str, credentials: Credentials | None) -> None:
+    """Accept an endpoint where the credentials, or none, will do; one that names certificates itself will do without.
 
     Raises:
-        KeysError: nobody would ask for them there.
+        KeysError: they will not.
     """
-    if not endpoint.startswith(SECURE):
+    if credentials is not None and not endpoint.startswith(SECURE):
         raise KeysError(
             f"{endpoint!r} is not encrypted and asks for no keys; with --keys expected an endpoint {SECURE}<host>:<port>"
         )
+    if credentials is None and endpoint.startswith(SECURE) and "#" not in endpoint:
+        raise KeysError(f"{endpoint!r} is encrypted; expected --keys with a folder made by `lalliance keys init`")
 
 
 def read(path: Path) -> bytes:

@@ -9,7 +9,7 @@ import socket
 import zenoh
 
 from lalliance_agents.bus.base import Closing
-from lalliance_agents.bus.credentials import Credentials, check_secure
+from lalliance_agents.bus.credentials import Credentials, check_fits
 from lalliance_agents.bus.session import (
     check_endpoint,
     close_session,
@@ -50,11 +50,10 @@ async def open_router(listen: str, *, credentials: Credentials | None = None) ->
 
     Raises:
         BusError: if `listen` is not an endpoint, or cannot be listened on.
-        KeysError: if there are credentials and nobody would ask for them there, or no rules with them.
+        KeysError: if it asks for credentials and there are none, or the other way round, or no rules with them.
     """
     check_endpoint(listen)
-    if credentials is not None:
-        check_secure(listen)
+    check_fits(listen, credentials)
     try:
         session = await open_session(router_settings(listen, credentials))
     except zenoh.ZError as error:

@@ -18,7 +18,7 @@ from typing import Any, Protocol, TypeVar
 import zenoh
 
 from lalliance_agents.bus.base import Answer, Delivery, Handler, PresenceHandler, Sample
-from lalliance_agents.bus.credentials import Credentials, check_secure
+from lalliance_agents.bus.credentials import Credentials, check_fits
 from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, QueuedBus, answers, check_timeout
 from lalliance_agents.bus.patterns import check_key, check_pattern
 from lalliance_agents.bus.session import (
@@ -68,11 +68,10 @@ async def open_bus(
 
     Raises:
         BusError: if `endpoint` is not an endpoint, or no router answers there in time.
-        KeysError: if there are credentials and nobody would ask for them there.
+        KeysError: if it asks for credentials and there are none, or the other way round.
     """
     check_endpoint(endpoint)
-    if credentials is not None:
-        check_secure(endpoint)
+    check_fits(endpoint, credentials)
     check_timeout(timeout)
     try:
         async with asyncio.timeout(timeout + 0.5):  # Zenoh keeps the limit itself, but for what it does not foresee
@@ -87,7 +86,7 @@ async def open_bus(
 
 def _of_keys(credentials: Credentials | None) -> str:
     if credentials is None:
-        return "that it asks for no keys (with an endpoint tls/…, expected --keys)"
+        return "that it asks for no keys"
     return (
         f"that the keys in {credentials.folder} come from the same `lalliance keys init` as the router's, which must have "
         "been told the router's host name"
