@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: How often to look whether a summary is there, in seconds.
 _PERIOD = 0.5
+#: What a summary has at least.
+_PARTS = {"mission", "complete", "makespan", "tasks", "takeovers", "faults", "trials", "messages", "control"}
 _EXPECTED = "expected what `lalliance world --summary FILE` has written"
 
 
@@ -63,7 +65,7 @@ def kept_summary(path: Path, *, wait: bool) -> dict[str, Any]:
         raise UserError(f"{path}: cannot be read ({error.strerror}); {_EXPECTED}") from None
     except ValueError:
         raise UserError(f"{path}: this is no summary; {_EXPECTED}") from None
-    if not isinstance(summary, dict) or not isinstance(summary.get("complete"), bool):
+    if not isinstance(summary, dict) or not summary.keys() >= _PARTS:
         raise UserError(f"{path}: this is no summary; {_EXPECTED}")
     found: dict[str, Any] = summary
     return found

@@ -43,6 +43,10 @@ def router(
     listen: Annotated[
         str | None, typer.Option(metavar="ENDPOINT", help="Where to listen; default: port 7447 of this machine.")
     ] = None,
+    others: Annotated[
+        list[str] | None,
+        typer.Option("--connect", metavar="ENDPOINT", help="Another router, to be one bus with; may be repeated."),
+    ] = None,
     keys: Keys = None,
     parent: Parent = None,
 ) -> None:
@@ -54,7 +58,8 @@ def router(
         from lalliance_agents.bus.credentials import ROUTER
         from lalliance_agents.bus.router import open_router
 
-        async with await open_router(endpoint, credentials=credentials_from(keys, ROUTER)) as running:
+        shown = credentials_from(keys, ROUTER)
+        async with await open_router(endpoint, credentials=shown, others=others or ()) as running:
             typer.echo(f"router listens on {running.endpoint}")
             sys.stdout.flush()
             await asyncio.Event().wait()

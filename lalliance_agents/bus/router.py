@@ -5,6 +5,7 @@ leaves the clients without a bus until one listens on the same endpoint again.
 """
 
 import socket
+from collections.abc import Sequence
 
 import zenoh
 
@@ -40,22 +41,24 @@ class Router(Closing):
         await close_session(self._session)
 
 
-async def open_router(listen: str, *, credentials: Credentials | None = None) -> Router:
+async def open_router(listen: str, *, credentials: Credentials | None = None, others: Sequence[str] = ()) -> Router:
     """Start a router that listens on `listen`, for example `tcp/127.0.0.1:7447`.
 
     Args:
         listen: the endpoint.
         credentials: what to show its clients, who then must show theirs and may say only what its rules allow; None: it
             asks for nothing, and lets everything through.
+        others: where other routers listen, which need not be there yet: what is said at one is heard at all of them.
 
     Raises:
         BusError: if `listen` is not an endpoint, or cannot be listened on.
         KeysError: if it asks for credentials and there are none, or the other way round, or no rules with them.
     """
-    check_endpoint(listen)
-    check_fits(listen, credentials)
+    for endpoint in (listen, *others):
+        check_endpoint(endpoint)
+        check_fits(endpoint, credentials)
     try:
-        session = await open_session(router_settings(listen, credentials))
+        session = await open_session(router_settings(listen, credentials, others))
     except zenoh.ZError as error:
         if "in use" in str(error):
             raise BusError(

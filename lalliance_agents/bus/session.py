@@ -13,7 +13,7 @@ import json
 import re
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
@@ -36,17 +36,24 @@ _IP_ENDPOINT = re.compile(
 T = TypeVar("T")
 
 
+#: How often to try again, when a connection could not be made or was lost.
+_RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
+
+
 def client_settings(endpoint: str, timeout: float, credentials: Credentials | None = None) -> dict[str, Any]:
     """A client of the one router at `endpoint`, given up after `timeout` seconds, but only before it first connected."""
-    retry = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
-    connect = {"endpoints": [endpoint], "timeout_ms": max(1, round(timeout * 1000)), "retry": retry}
+    connect = {"endpoints": [endpoint], "timeout_ms": max(1, round(timeout * 1000)), "retry": _RETRY}
     return {"mode": "client", "connect": connect, **_settings(credentials)}
 
 
-def router_settings(listen: str, credentials: Credentials | None = None) -> dict[str, Any]:
-    """A router that listens on one endpoint; with credentials, it lets through only what the rules with them allow."""
+def router_settings(listen: str, credentials: Credentials | None = None, others: Sequence[str] = ()) -> dict[str, Any]:
+    """A router that listens on one endpoint; with credentials, it lets through only what the rules with them allow.
+
+    It connects to `others`, other routers, as soon as they are there, and again whenever a connection was lost.
+    """
+    connect = {"endpoints": [*others], "timeout_ms": -1, "exit_on_failure": False, "retry": _RETRY}
     rules = {} if credentials is None else {"access_control": credentials.access_rules()}
-    return {"mode": "router", "listen": {"endpoints": [listen]}, **_settings(credentials), **rules}
+    return {"mode": "router", "listen": {"endpoints": [listen]}, "connect": connect, **_settings(credentials), **rules}
 
 
 def _settings(credentials: Credentials | None) -> dict[str, Any]:

@@ -70,7 +70,7 @@ class Deployment:
     def up(self, mission: str) -> None:
         """Bring it up, with somebody who looks on from the beginning; there are no robots before that."""
         self.run("up", "--detach", "--pull", "never", "--wait", "router")
-        program = Path(__file__).with_name("onlooker.py").read_text()
+        program = (ROOT / "tests/support/onlooker.py").read_text()
         words = ["run", "--detach", "--no-deps", "--entrypoint", "python", "operator", "-c", program, mission]
         self._follow(self.run(*words).split()[-1])
         self.wait_for("looking on")

@@ -1,9 +1,12 @@
-"""Runs in a container of the deployment, with an operator's keys, and prints what happens there, a line each.
+"""A process of its own that takes an operator's keys and prints what happens in a mission, a line each.
+
+It finds the router and the keys where the environment says, as the commands do: `LALLIANCE_CONNECT` and `LALLIANCE_KEYS`.
 
 Events and decisions are told as `lalliance run` tells them; and of each life of a robot, when it was first heard.
 """
 
 import asyncio
+import os
 import sys
 import time
 from pathlib import Path
@@ -29,7 +32,8 @@ async def look_on(mission: str) -> None:
             heard.add(life)
             print(f"heard {message.sender} first at {time.time():.3f}", flush=True)
 
-    async with await open_bus("tls/router:7447", credentials=credentials_in(Path("/keys"), OPERATOR)) as bus:
+    shown = credentials_in(Path(os.environ["LALLIANCE_KEYS"]), OPERATOR)
+    async with await open_bus(os.environ["LALLIANCE_CONNECT"], credentials=shown) as bus:
         messenger = Messenger(bus, keys, OPERATOR, 1, time.monotonic)
         for kind in (Kind.EVENT, Kind.DECISION):
             await messenger.listen(keys.build(kind), tell)
@@ -39,4 +43,5 @@ async def look_on(mission: str) -> None:
         await asyncio.Event().wait()
 
 
-asyncio.run(look_on(sys.argv[1]))
+if __name__ == "__main__":
+    asyncio.run(look_on(sys.argv[1]))
