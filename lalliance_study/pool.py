@@ -1,7 +1,7 @@
 """Work on all cores: parts go to processes of their own, and results come as they are ready.
 
-Ctrl-C is for the parent alone: it ends the children and says what it has. Children end with their parent, whatever that dies
-of.
+Ctrl-C and a request to end are for the parent alone: it ends the children and says what it has. Children end with their parent,
+whatever that dies of.
 """
 
 import multiprocessing
@@ -64,12 +64,16 @@ def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs
 
 
 def _submit(pool: ProcessPoolExecutor, work: Callable[..., T], part: tuple[Any, ...]) -> Future[T]:
-    """Hand over a part; a process that this starts is born deaf to Ctrl-C."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Hand over a part; a process that this starts is born deaf to Ctrl-C, and is started wholly or not at all."""
+    told: list[int] = []
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN), signal.signal(signal.SIGTERM, lambda *_: told.append(1))
     try:
         return pool.submit(work, *part)
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, before[0])
+        signal.signal(signal.SIGTERM, before[1])
+        if told:
+            signal.raise_signal(signal.SIGTERM)
 
 
 def _begin(parent: int) -> None:

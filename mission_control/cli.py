@@ -11,7 +11,6 @@ import json
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -32,8 +31,12 @@ from mission_control.shell import (
     MissionPath,
     Seed,
     Speed,
+    ToldToEnd,
+    end_when_told,
     load_part,
     run_until_told,
+    warn,
+    warn_of,
 )
 from mission_control.simulate import simulate
 from mission_control.single import health, robot, router, summary, world
@@ -105,10 +108,9 @@ def run(
         from mission_control.deploy.team_keys import check_team
 
         check_team(keys, path, mission, with_router=connect is None)
-    for warning in mission.warnings():
-        _warn(f"{path}: {warning}")
+    warn_of(path, mission)
     if (real := mission.parameters.silence_timeout / speed) < SHORTEST_SILENCE:
-        _warn(
+        warn(
             f"--speed {speed:g} makes {real:.2g} real seconds of silence a failure; a busy machine may see some that are none"
         )
 
@@ -140,8 +142,7 @@ def check(path: MissionPath) -> None:
     from mission_control.summary import fault_lines
 
     mission = load_part(path, None, part="team")
-    for warning in mission.warnings():
-        _warn(f"{path}: {warning}")
+    warn_of(path, mission)
     parts = {
         "robot": len(mission.robots),
         "task": len(mission.tasks),
@@ -173,24 +174,22 @@ def _kept(journal: Path | None) -> Iterator[Path]:
     if journal is not None:
         yield journal
         return
-    try:
-        folder = tempfile.TemporaryDirectory(prefix="lalliance-", ignore_cleanup_errors=True)
-    except OSError as error:
-        raise UserError(
-            f"no folder for temporary files ({error.strerror}); expected one that can be written to, or --journal FILE"
-        ) from error
-    with folder as name:
-        yield Path(name) / "journal"
+    from mission_control.temporary import own_folder
+
+    with contextlib.ExitStack() as open_until_then:
+        try:
+            folder = open_until_then.enter_context(own_folder())
+        except OSError as error:
+            raise UserError(
+                f"no folder for temporary files ({error.strerror}); expected one that can be written to, or --journal FILE"
+            ) from error
+        yield folder / "journal"
 
 
 def _view(mission: "Mission", console: "Console", *, plain: bool) -> "Lines":
     from mission_control.live import Lines, LiveView
 
     return LiveView(mission, console) if console.is_terminal and not plain else Lines(console)
-
-
-def _warn(text: str) -> None:
-    typer.echo(f"lalliance: warning: {text}", err=True)
 
 
 def _fail(text: str, status: int) -> NoReturn:
@@ -202,13 +201,16 @@ def main() -> None:
     """Run the command line; errors become one sentence on standard error."""
     sys.path.insert(0, str(Path.cwd()))
     try:
+        end_when_told()
         app()
     except UserError as error:
         _fail(str(error), 2)
     except LallianceError as error:
         _fail(str(error), 1)
-    except KeyboardInterrupt:
-        _fail("interrupted", 128 + signal.SIGINT)
+    except ToldToEnd as told:
+        if told.number is signal.SIGINT:
+            typer.echo("lalliance: interrupted", err=True)
+        sys.exit(128 + told.number)
     except OSError as error:
         if error.errno not in {errno.EPIPE, errno.ENOSPC}:
             raise
@@ -216,3 +218,8 @@ def main() -> None:
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    finally:
+        # What is left to do must not take long; who is asked to end now ends at once.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.SIG_DFL)

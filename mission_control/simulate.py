@@ -2,17 +2,19 @@
 
 import json
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lalliance_agents.errors import UserError
-from mission_control.shell import AsJson, MissionPath
+from mission_control.shell import AsJson, MissionPath, warn_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from lalliance_agents.config import Mission
+    from lalliance_study.simulator import Simulator
 
 
 def simulate(
@@ -37,6 +39,7 @@ def simulate(
     mission = load(path, for_team=False)
     if seed is not None:
         mission = mission.model_copy(update={"seed": seed})
+    warn_of(path, mission)
     console = Console(stderr=as_json)
     found = (
         _once(mission, console, events=events, as_json=as_json) if runs == 1 else _often(mission, runs, jobs, console)
@@ -51,12 +54,30 @@ def _once(mission: "Mission", console: "Console", *, events: bool, as_json: bool
     from mission_control.summary import show
 
     simulator = Simulator(mission)
-    summary = simulator.run()
+    with _progress(simulator):
+        summary = simulator.run()
     if not as_json:
         for line in simulator.log if events else ():
             typer.echo(str(line))
         show(summary, console)
     return {**summary, "events": [line._asdict() for line in simulator.log]} if events else summary
+
+
+def _progress(simulator: "Simulator") -> AbstractContextManager[object]:
+    """How far a mission is in virtual time, on standard error, if that is a terminal."""
+    from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
+
+    def reached() -> Text:
+        world = simulator.world
+        trial = f"trial {world.trial} of {world.trials_planned}, " if world.trials_planned > 1 else ""
+        return Text(f"{world.mission.name}: {trial}{world.elapsed:,.0f} s of at most {world.mission.deadline:,.0f} s")
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        return nullcontext()
+    return Live(get_renderable=reached, console=console, refresh_per_second=5, transient=True)
 
 
 def _often(mission: "Mission", runs: int, jobs: int | None, console: "Console") -> Mapping[str, Any]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mission_control.shell import MissionPath, Speed, load_part
+from mission_control.shell import MissionPath, Speed, load_part, warn
 
 if TYPE_CHECKING:
     from lalliance_agents.config import Mission
@@ -42,7 +42,7 @@ def compose(
     if keys is not None:
         check_team(keys, path, mission)
     for warning in _warnings(mission):
-        typer.echo(f"lalliance: warning: {path}: {warning}", err=True)
+        warn(f"{path}: {warning}")
     words = ["lalliance", "deploy", "compose", str(path), "--folder", str(folder), "--speed", f"{speed:g}"]
     words += [] if keys is None else ["--keys", str(keys)]
     document = compose_of(mission, path, folder, keys=keys or folder / "keys", speed=speed)

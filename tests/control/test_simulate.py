@@ -1,6 +1,11 @@
 """`lalliance simulate`: what it prints, and what it refuses."""
 
 import json
+import os
+import re
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -43,6 +48,32 @@ def test_a_mission_that_does_not_complete_is_status_1(processes: Processes) -> N
     done = processes.run("simulate", "short.yaml", "--runs", "2", "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)["makespan"] is None
+
+
+ENDLESS = """\
+name: endless
+tasks: {a: {}}
+robots: {one: {tasks: {a: 8}}}
+parameters: {max_delay: 0.3}
+faults: [{at: 1, robot: one, kind: crash}]
+deadline: 1e9
+"""
+
+
+def test_a_mission_without_an_end_is_warned_of_and_shows_how_far_it_is(tmp_path: Path) -> None:
+    (tmp_path / "endless.yaml").write_text(ENDLESS)
+    terminal, end = os.openpty()
+    words = [sys.executable, "-m", "mission_control", "simulate", str(tmp_path / "endless.yaml")]
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=end) as running:
+        os.close(end)
+        shown = ""
+        while not re.search(r"endless: \d,\d{3} s of at most 1,000,000,000 s", shown):
+            shown += os.read(terminal, 4096).decode()
+        running.send_signal(signal.SIGINT)
+        assert running.wait(10) == 130
+    os.close(terminal)
+    assert "warning" in shown
+    assert "tasks.a: no robot is left for it after crash of one at 1 s" in " ".join(shown.split())
 
 
 @pytest.mark.parametrize(
