@@ -92,6 +92,10 @@ end() {
     [ -z "$NAT" ] || kill "$NAT" 2>/dev/null
     for _ in $(seq 200); do [ -n "$DAEMON_PID" ] && [ -d "/proc/$DAEMON_PID" ] || break; sleep 0.05; done
     forget "$NAME"
+    if [ -d "/proc/${DAEMON_PID:-none}" ] || [ -e "$HOME_OF_RUN" ] || grep -q "$NAME" /proc/self/mounts ||
+        [ -n "$(find /sys/fs/cgroup -maxdepth 2 -name "$NAME")" ]; then
+        say "a process, folder, mount or control group of the daemon is left"; exit 1
+    fi
 }
 trap end EXIT
 trap 'exit 130' INT TERM
