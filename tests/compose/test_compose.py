@@ -82,7 +82,7 @@ def test_whatever_fails_the_mission_goes_on(deployed) -> None:
 
     robot, _ = busy()
     with team.slowed(f"robot-{robot}", delay=100, jitter=20, loss=15) as line:
-        answers = [team.run("run", "--rm", "--no-TTY", "operator") for _ in range(5)]
+        answers = [team.run("run", "--rm", "--no-TTY", "operator") for _ in range(2)]
     assert all(answer.startswith("Mission two_tasks: running") for answer in answers)
     assert line["packets"] > 20
     assert line["lost"] > 0
