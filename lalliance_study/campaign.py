@@ -27,9 +27,9 @@ from lalliance_study.random_missions import Document, draw_mission, mission_of
 from lalliance_study.shrink import shrink
 
 #: One in so many missions is run once more, and once with another seed.
-REPEAT_EVERY = 25
+REPEAT_EVERY = 50
 #: One in so many missions is run with every step made, which takes longer.
-EVERY_STEP_EVERY = 50
+EVERY_STEP_EVERY = 200
 #: A mission that takes longer to simulate has no end, in seconds of this machine.
 TIME_LIMIT = 120.0
 

@@ -7,10 +7,11 @@ whatever that dies of.
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 from rich.console import Console
@@ -25,7 +26,7 @@ AHEAD = 3
 T = TypeVar("T")
 
 
-def at_once(work: Callable[..., T], parts: Iterable[tuple[Any, ...]], jobs: int | None) -> Iterator[T]:
+def at_once(work: Callable[..., T], parts: Iterable[tuple[Any, ...]], jobs: int | None) -> Generator[T, None, None]:
     """What `work` returns for each of `parts`, in the order in which that comes.
 
     Args:
@@ -40,15 +41,17 @@ def at_once(work: Callable[..., T], parts: Iterable[tuple[Any, ...]], jobs: int 
     return (work(*part) for part in parts) if jobs == 1 else _in_processes(work, iter(parts), jobs)
 
 
-def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs: int) -> Iterator[T]:
+def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs: int) -> Generator[T, None, None]:
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(os.getpid(),))
     waiting: set[Future[T]] = set()
+    through = False
     try:
         while True:
             while len(waiting) < AHEAD * jobs and (part := next(parts, None)) is not None:
                 waiting.add(_submit(pool, work, part))
             if not waiting:
+                through = True
                 return
             done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for one in done:
@@ -57,27 +60,35 @@ def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs
         raise LallianceError("a process that did a part of the work was killed; is memory short?") from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-        if waiting:
+        if not through:
             # Told to end early: nobody will ask for what they are at.
             for child in multiprocessing.active_children():
                 child.terminate()
 
 
+#: What ends this process, which is put off while another one is born.
+_ENDS = (signal.SIGINT, signal.SIGTERM)
+
+
 def _submit(pool: ProcessPoolExecutor, work: Callable[..., T], part: tuple[Any, ...]) -> Future[T]:
-    """Hand over a part; a process that this starts is born deaf to Ctrl-C, and is started wholly or not at all."""
-    told: list[int] = []
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN), signal.signal(signal.SIGTERM, lambda *_: told.append(1))
+    """Hand over a part; a process that this starts is born deaf, as it inherits what is blocked here."""
+    came: list[int] = []
+    before = {number: signal.signal(number, lambda told, _: came.append(told)) for number in _ENDS}
     try:
+        resource_tracker.ensure_running()  # which would unblock them if it were started along with the first process
+        signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS)
         return pool.submit(work, *part)
     finally:
-        signal.signal(signal.SIGINT, before[0])
-        signal.signal(signal.SIGTERM, before[1])
-        if told:
-            signal.raise_signal(signal.SIGTERM)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDS)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for told in came:
+            signal.raise_signal(told)
 
 
 def _begin(parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDS)
     end_with_parent(parent)
 
 

@@ -40,6 +40,7 @@ from mission_control.shell import (
 )
 from mission_control.simulate import simulate
 from mission_control.single import health, robot, router, summary, world
+from mission_control.study_command import study
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -94,6 +95,7 @@ def run(
     from rich.console import Console
 
     from mission_control.launch import Beginning, Launcher, Plan
+    from mission_control.yardstick import with_optimum
     from world_server.history import recall
 
     if connect is not None and listen is not None:
@@ -124,7 +126,8 @@ def run(
             return await Launcher(plan(kept), view).run()
 
     with _kept(journal) as kept:
-        tell(run_until_told(launch(kept)), as_json=as_json, console=console)
+        outcome = run_until_told(launch(kept))
+    tell(with_optimum(outcome, mission), as_json=as_json, console=console)
 
 
 app.command()(simulate)
@@ -166,6 +169,7 @@ def schema() -> None:
 app.add_typer(chaos, name="chaos")
 app.add_typer(keys_command, name="keys")
 app.add_typer(deploy, name="deploy")
+app.add_typer(study, name="study")
 
 
 @contextlib.contextmanager

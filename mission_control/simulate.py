@@ -52,10 +52,11 @@ def simulate(
 def _once(mission: "Mission", console: "Console", *, events: bool, as_json: bool) -> Mapping[str, Any]:
     from lalliance_study.simulator import Simulator
     from mission_control.summary import show
+    from mission_control.yardstick import with_optimum
 
     simulator = Simulator(mission)
     with _progress(simulator):
-        summary = simulator.run()
+        summary = with_optimum(simulator.run(), mission)
     if not as_json:
         for line in simulator.log if events else ():
             typer.echo(str(line))
@@ -83,6 +84,7 @@ def _progress(simulator: "Simulator") -> AbstractContextManager[object]:
 def _often(mission: "Mission", runs: int, jobs: int | None, console: "Console") -> Mapping[str, Any]:
     from lalliance_study.pool import at_once, progress
     from lalliance_study.runs import overview, simulate_seeds
+    from mission_control.yardstick import with_optimum
 
     parts = [
         range(first, min(first + PART, mission.seed + runs)) for first in range(mission.seed, mission.seed + runs, PART)
@@ -92,7 +94,7 @@ def _often(mission: "Mission", runs: int, jobs: int | None, console: "Console") 
         for part in at_once(simulate_seeds, [(mission, part) for part in parts], jobs):
             found += part
             advance(len(part), "")
-    document = overview(mission, sorted(found))
+    document = with_optimum(overview(mission, sorted(found)), mission)
     if not console.stderr:
         _show(document, mission, console)
     return document
@@ -116,6 +118,9 @@ def _show(document: Mapping[str, Any], mission: "Mission", console: "Console") -
     if document["makespan"]:
         spread = ", ".join(f"{name} {value:.1f} s" for name, value in document["makespan"].items())
         console.print(f"Makespan: {spread}", highlight=False)
+    if document["ratio"] is not None:
+        told = f"the mean is {document['ratio']:.2f} times the optimum of {document['optimum']:.1f} s"
+        console.print(f"Optimum: {told}", highlight=False)
     takeovers = ", ".join(f"{count} {cause}" for cause, count in document["takeovers"].items()) or "none"
     console.print(f"Takeovers: {takeovers}", highlight=False)
     for fault, fired in zip(mission.faults, document["faults"], strict=True):

@@ -31,9 +31,10 @@ def _parts(summary: Mapping[str, Any]) -> Iterator[RenderableType]:
 
 def _headline(summary: Mapping[str, Any]) -> Text:
     if summary["complete"]:
-        return Text(
-            f"\nMission {summary['mission']} complete: makespan {summary['makespan']:.1f} s", style="bold green"
-        )
+        told = f"\nMission {summary['mission']} complete: makespan {summary['makespan']:.1f} s"
+        if summary.get("ratio") is not None:
+            told += f", {summary['ratio']:.2f} times the optimum of {summary['optimum']:.1f} s"
+        return Text(told, style="bold green")
     return Text(f"\nMission {summary['mission']} not complete", style="bold red")
 
 

@@ -111,5 +111,5 @@ def planned(mission: str, fault: str) -> str:
 
 def test_every_command_of_the_tool_is_in_the_readme(processes: Processes) -> None:
     listed = re.findall(r"^  (\w+)  ", processes.run("--help").stdout, flags=re.MULTILINE)
-    assert len(listed) == 13
+    assert len(listed) == 14
     assert [name for name in listed if f"lalliance {name}" not in README] == []
