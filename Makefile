@@ -6,7 +6,7 @@ SETUP := .venv/.set-up
 # Tests that start no processes may run side by side; the others need the machine for themselves.
 SIDE_BY_SIDE := tests/agent tests/model tests/study tests/wire tests/world tests/test_mission_file.py
 
-.PHONY: demo test campaign check clean
+.PHONY: demo test test-compose campaign check clean
 
 $(SETUP): pyproject.toml constraints.txt
 	@echo "Setting up .venv: this takes about a minute, and a package index"
@@ -19,7 +19,10 @@ demo: $(SETUP)  ## a team of robot processes finishes a mission although one of 
 
 test: $(SETUP)
 	$(BIN)/pytest --numprocesses auto $(SIDE_BY_SIDE)
-	$(BIN)/pytest $(addprefix --ignore=,$(SIDE_BY_SIDE))
+	$(BIN)/pytest $(addprefix --ignore=,$(SIDE_BY_SIDE) tests/compose)
+
+test-compose: $(SETUP)  ## the real image and the deployment, in a docker daemon of its own; needs root on Debian
+	tests/compose/with_docker.sh $(BIN)/pytest -s tests/compose
 
 campaign: $(SETUP)  ## random missions with faults, held to what must never fail
 	$(BIN)/lalliance campaign --missions 2000 --seed 1
@@ -29,6 +32,9 @@ check: $(SETUP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/hadolint deploy/Dockerfile
+	$(BIN)/check-jsonschema --builtin-schema vendor.compose-spec deploy/compose.yaml
+	if docker compose version >/dev/null 2>&1; then docker compose -f deploy/compose.yaml config --quiet; fi
 
 clean:
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist

@@ -6,11 +6,7 @@ They are looked for when they are used, so that the rest runs without them.
 from importlib import import_module
 from types import ModuleType
 
-from lalliance_agents.errors import UserError
-
-
-class MissingExtraError(UserError):
-    """A package of an extra is not installed."""
+from lalliance_agents.extras import extra as needed_extra
 
 
 def study_package(module: str, extra: str = "study") -> ModuleType:
@@ -19,10 +15,5 @@ def study_package(module: str, extra: str = "study") -> ModuleType:
     Raises:
         MissingExtraError: it is not installed.
     """
-    try:
+    with needed_extra(extra):
         return import_module(module)
-    except ModuleNotFoundError as error:
-        raise MissingExtraError(
-            f"this needs the package {(error.name or module).partition('.')[0]}, which is not installed; "
-            f"expected the {extra} extra: pip install 'lalliance[{extra}]'"
-        ) from None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
+from mission_control.shell import DEFAULT_ENDPOINT, AsJson, Keys, MissionPath, run_until_told
 
 if TYPE_CHECKING:
     from lalliance_agents.config import Mission
@@ -22,6 +22,7 @@ Connect = Annotated[
     str | None,
     typer.Option(
         metavar="ENDPOINT",
+        envvar="LALLIANCE_CONNECT",
         help=f"The router to connect to; default: that of the mission if it runs on this machine, else {DEFAULT_ENDPOINT}.",
     ),
 ]
@@ -45,6 +46,7 @@ def inject(
         ),
     ],
     connect: Connect = None,
+    keys: Keys = None,
     as_json: AsJson = False,
 ) -> None:
     """Put a fault in force, such as kind=hang robot=NAME for=5."""
@@ -52,7 +54,7 @@ def inject(
 
     mission = _mission(context)
     wanted = read_injection(words, mission)
-    answer = _ask(mission, connect, verb="inject", fault=wanted.fault, lasts=wanted.lasts)
+    answer = _ask(mission, connect, keys, verb="inject", fault=wanted.fault, lasts=wanted.lasts)
     _tell(answer, as_json=as_json)
 
 
@@ -63,6 +65,7 @@ def heal(
         str, typer.Argument(help="Which fault, as `status` calls it; default: all.", show_default=False)
     ] = "",
     connect: Connect = None,
+    keys: Keys = None,
     as_json: AsJson = False,
 ) -> None:
     """End a fault, or all; a robot that was killed is started again."""
@@ -70,15 +73,15 @@ def heal(
     from lalliance_agents.wire.messages import LONGEST_WORD
 
     # No fault has a longer name, so the world refuses what is left of one.
-    answer = _ask(_mission(context), connect, verb="heal", name=one_line(name)[:LONGEST_WORD])
+    answer = _ask(_mission(context), connect, keys, verb="heal", name=one_line(name)[:LONGEST_WORD])
     _tell(answer, as_json=as_json)
 
 
 @chaos.command()
-def status(context: typer.Context, connect: Connect = None, as_json: AsJson = False) -> None:
+def status(context: typer.Context, connect: Connect = None, keys: Keys = None, as_json: AsJson = False) -> None:
     """Show every fault of the mission, and whether it fired."""
     mission = _mission(context)
-    answer = _ask(mission, connect, verb="status")
+    answer = _ask(mission, connect, keys, verb="status")
     if as_json:
         _tell(answer, as_json=True)
         return
@@ -98,10 +101,10 @@ def _mission(context: typer.Context) -> "Mission":
     return load_mission(path)
 
 
-def _ask(mission: "Mission", connect: str | None, **command: Any) -> "ChaosAnswer":
+def _ask(mission: "Mission", connect: str | None, keys: Path | None, **command: Any) -> "ChaosAnswer":
     from mission_control.chaos_client import ask
 
-    return run_until_told(ask(mission.name, connect, **command))
+    return run_until_told(ask(mission.name, connect, keys, **command))
 
 
 def _tell(answer: "ChaosAnswer", *, as_json: bool) -> None:

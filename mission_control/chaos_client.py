@@ -1,5 +1,6 @@
 """Commands to the world of a running mission, over its bus: one question, one answer."""
 
+from pathlib import Path
 from typing import Any
 
 from lalliance_agents.agent.catalog import fresh_incarnation
@@ -10,28 +11,30 @@ from lalliance_agents.errors import BusError, MessageError, UserError
 from lalliance_agents.wire.keys import OPERATOR, WORLD, Keys, Kind
 from lalliance_agents.wire.messages import ChaosAnswer, ChaosCommand, decode, encode
 from mission_control.running import endpoints
-from mission_control.shell import DEFAULT_ENDPOINT
+from mission_control.shell import credentials_from, endpoint_of
 
 #: How long to look for the router, and how long to wait for the world's answer, in seconds.
 TIMEOUT = 3.0
 
 
-async def ask(mission: str, endpoint: str | None, **command: Any) -> ChaosAnswer:
+async def ask(mission: str, endpoint: str | None, keys: Path | None = None, **command: Any) -> ChaosAnswer:
     """What the world of the mission answers to a command.
 
     Args:
         mission: its name.
         endpoint: the router of its bus; None: where the mission runs on this machine, or else the usual one.
+        keys: the folder of keys, if its bus asks for them.
         command: the fields of a `ChaosCommand`.
 
     Raises:
         UserError: it refuses, or nobody answers.
     """
     found = _find(mission) if endpoint is None else endpoint
-    endpoint = found or DEFAULT_ENDPOINT
+    endpoint = endpoint_of(found, keys)
+    shown = credentials_from(keys, OPERATOR)
     key = Keys(mission).build(Kind.CHAOS_COMMAND)
     try:
-        async with await open_bus(endpoint, timeout=TIMEOUT) as bus:
+        async with await open_bus(endpoint, timeout=TIMEOUT, credentials=shown) as bus:
             messenger = Messenger(bus, Keys(mission), OPERATOR, fresh_incarnation(), MissionClock().now)
             question = encode(ChaosCommand(**messenger.header(), **command))
             samples = await bus.query(key, question, timeout=TIMEOUT)

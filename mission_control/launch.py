@@ -13,13 +13,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from lalliance_agents.bus.base import Bus
+from lalliance_agents.bus.credentials import credentials_in
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import BusError, UserError
-from lalliance_agents.wire.keys import LAUNCHER, WORLD, Key, Keys, Kind
+from lalliance_agents.wire.keys import LAUNCHER, OPERATOR, WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message, Status
 from mission_control.keeper import Keeper, LaunchError, View
 from mission_control.orders import Orders
@@ -86,6 +87,7 @@ class Plan:
         connect: the endpoint of a router that runs already; None: start one.
         listen: where a router of our own listens; None: a free port on this machine.
         learned: the folder of learned times; None: nothing is stored.
+        keys: the folder of the team's keys, which have been checked; None: the bus asks for none.
     """
 
     path: Path
@@ -96,6 +98,7 @@ class Plan:
     connect: str | None = None
     listen: str | None = None
     learned: Path | None = None
+    keys: Path | None = None
 
     @classmethod
     def kept_in(cls, folder: Path, path: Path, mission: Mission, **options: Any) -> "Plan":
@@ -103,9 +106,22 @@ class Plan:
         journal = folder / "journal"
         return cls(path.resolve(), mission, journal, Beginning.of(recall(journal, mission)), **options)
 
+    def endpoint(self) -> str:
+        """Where the mission's router is, or is to be."""
+        asked = self.listen if self.connect is None else self.connect
+        return free_endpoint("tcp" if self.keys is None else "tls") if asked is None else asked
+
+    def shown(self) -> list[str]:
+        """Arguments of every process, with which it shows who it is."""
+        return [] if self.keys is None else ["--keys", str(self.keys)]
+
+    def router(self, endpoint: str) -> list[str]:
+        """Arguments of the router's process."""
+        return ["router", "--listen", endpoint, *self.shown()]
+
     def common(self, endpoint: str) -> list[str]:
-        """Arguments of every process of the mission."""
-        return ["--connect", endpoint, "--speed", repr(self.speed), "--seed", str(self.mission.seed)]
+        """Arguments of every process of the mission but the router's."""
+        return ["--connect", endpoint, "--speed", repr(self.speed), "--seed", str(self.mission.seed), *self.shown()]
 
     def robot(self, name: str, incarnation: int, endpoint: str) -> list[str]:
         """Arguments of a robot's process."""
@@ -134,8 +150,7 @@ class Launcher:
         self._plan = plan
         self._view = view
         self._clock = MissionClock(plan.speed)
-        asked = plan.listen if plan.connect is None else plan.connect
-        self._endpoint = free_endpoint() if asked is None else asked
+        self._endpoint = plan.endpoint()
         self._router: Child | None = None
         self._robots: dict[str, Child] = {}
         self._lives = dict(plan.beginning.lives)
@@ -160,7 +175,9 @@ class Launcher:
             if self._plan.connect is None:
                 await self._start_router()
             name = self._plan.mission.name
-            async with await open_bus(self._endpoint) as bus:
+            keys = self._plan.keys
+            shown = None if keys is None else credentials_in(keys, OPERATOR)
+            async with await open_bus(self._endpoint, credentials=shown) as bus:
                 with announced(name, self._endpoint):
                     self._view.locate(name, self._endpoint)
                     return await self._conduct(bus)
@@ -232,7 +249,7 @@ class Launcher:
         self._view.say(f"[{name}] {line}")
 
     async def _start_router(self) -> None:
-        arguments = ["router", "--listen", self._endpoint]
+        arguments = self._plan.router(self._endpoint)
         child = await Child.start("router", arguments, lambda _name, _line: None, keeps_output=True)
         self._router = child
         try:
@@ -252,7 +269,7 @@ class Launcher:
         for _ in range(ROUTER_RESTARTS):
             await child.wait()
             self._view.say(f"the router ended ({child.status}); starting it again")
-            arguments = ["router", "--listen", self._endpoint]
+            arguments = self._plan.router(self._endpoint)
             child = self._router = await Child.start("router", arguments, self._on_line, keeps_output=True)
             await child.read_line()
 

@@ -4,19 +4,65 @@ import asyncio
 import signal
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
 if TYPE_CHECKING:
+    from lalliance_agents.bus.credentials import Credentials
     from lalliance_agents.config import Mission
 
+#: Where a router is that nobody named: without keys, and with them.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+SECURE_ENDPOINT = "tls/127.0.0.1:7447"
 
 MissionPath = Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file (YAML).", show_default=False)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output.")]
+Keys = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        envvar="LALLIANCE_KEYS",
+        help="Keys of `lalliance keys init`: with them the bus is encrypted and knows who is who.",
+    ),
+]
+
+Speed = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Mission seconds per real second.")]
+Seed = Annotated[
+    int | None, typer.Option(min=0, max=2**63 - 1, help="All randomness; default: the mission's own seed.")
+]
+Learned = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Where robots keep what they learned; default: nowhere.")
+]
+JournalPath = Annotated[
+    Path | None,
+    typer.Option("--journal", metavar="FILE", help="What happens is kept there; if it is there, the mission goes on."),
+]
 
 T = TypeVar("T")
+
+
+def endpoint_of(given: str | None, keys: Path | None) -> str:
+    """Where the router is: the usual place if nobody says."""
+    if given is not None:
+        return given
+    return DEFAULT_ENDPOINT if keys is None else SECURE_ENDPOINT
+
+
+def credentials_from(keys: Path | None, name: str) -> "Credentials | None":
+    """The checked credentials of `name` in the folder of keys, if there is one.
+
+    Raises:
+        KeysError: they cannot be used.
+    """
+    if keys is None:
+        return None
+    from lalliance_agents.extras import extra
+
+    with extra("deploy"):
+        from lalliance_agents.bus.certificates import checked_credentials
+
+    return checked_credentials(keys, name)
 
 
 def warn(text: str) -> None:
@@ -79,3 +125,19 @@ def run_until_told(work: Coroutine[Any, Any, T]) -> T:
         raise ToldToEnd(told[0] if told else signal.SIGTERM) from None
     finally:
         end_when_told()
+
+
+def load_part(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":
+    """The checked mission at `path`.
+
+    Whole for a team; without the robots' own code for a world, and without the world's environment for a robot.
+    """
+    if part == "robot":
+        from lalliance_agents.mission_file import load_mission
+
+        mission = load_mission(path)
+    else:
+        from mission_control.missions import load
+
+        mission = load(path, for_team=part == "team")
+    return mission if seed is None else mission.model_copy(update={"seed": seed})

@@ -30,7 +30,7 @@ def with_optimum(summary: Mapping[str, Any], mission: Mission) -> dict[str, Any]
 
 
 def _optimum(mission: Mission) -> float | None:
-    from lalliance_study.extras import MissingExtraError
+    from lalliance_agents.extras import MissingExtraError
     from lalliance_study.optimum import NoYardstickError, optimum_of
 
     if len(mission.robots) * len(mission.tasks) > LARGEST:

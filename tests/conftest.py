@@ -1,11 +1,15 @@
 """Which event loop a test runs in: one with virtual time if it asks for it, else a real one."""
 
 import asyncio
+import os
 import signal
 from collections.abc import Callable, Mapping
 
 import pytest
 from support.virtual_time import VirtualTimeLoop
+
+#: These need a docker daemon and what `with_docker.sh` tells of it.
+collect_ignore = [] if "DAEMON_PID" in os.environ else ["compose"]
 
 
 def pytest_asyncio_loop_factories(

@@ -5,10 +5,12 @@ leaves the clients without a bus until one listens on the same endpoint again.
 """
 
 import socket
+from collections.abc import Sequence
 
 import zenoh
 
 from lalliance_agents.bus.base import Closing
+from lalliance_agents.bus.credentials import Credentials, check_fits
 from lalliance_agents.bus.session import (
     check_endpoint,
     close_session,
@@ -39,15 +41,24 @@ class Router(Closing):
         await close_session(self._session)
 
 
-async def open_router(listen: str) -> Router:
+async def open_router(listen: str, *, credentials: Credentials | None = None, others: Sequence[str] = ()) -> Router:
     """Start a router that listens on `listen`, for example `tcp/127.0.0.1:7447`.
+
+    Args:
+        listen: the endpoint.
+        credentials: what to show its clients, who then must show theirs and may say only what its rules allow; None: it
+            asks for nothing, and lets everything through.
+        others: where other routers listen, which need not be there yet: what is said at one is heard at all of them.
 
     Raises:
         BusError: if `listen` is not an endpoint, or cannot be listened on.
+        KeysError: if it asks for credentials and there are none, or the other way round, or no rules with them.
     """
-    check_endpoint(listen)
+    for endpoint in (listen, *others):
+        check_endpoint(endpoint)
+        check_fits(endpoint, credentials)
     try:
-        session = await open_session(router_settings(listen))
+        session = await open_session(router_settings(listen, credentials, others))
     except zenoh.ZError as error:
         if "in use" in str(error):
             raise BusError(
@@ -60,8 +71,8 @@ async def open_router(listen: str) -> Router:
     return Router(session, listen)
 
 
-def free_endpoint() -> str:
+def free_endpoint(protocol: str = "tcp") -> str:
     """An endpoint on this machine alone, with a TCP port that is free just now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"

@@ -13,13 +13,14 @@ import json
 import re
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
 import zenoh
 
 from lalliance_agents.bus.base import LEASE
+from lalliance_agents.bus.credentials import Credentials
 from lalliance_agents.errors import BusError
 
 #: Larger messages are refused by the transport, in bytes.
@@ -35,26 +36,49 @@ _IP_ENDPOINT = re.compile(
 T = TypeVar("T")
 
 
-def client_settings(endpoint: str, timeout: float) -> dict[str, Any]:
+#: How often to try again, when a connection could not be made or was lost.
+_RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
+
+
+def client_settings(endpoint: str, timeout: float, credentials: Credentials | None = None) -> dict[str, Any]:
     """A client of the one router at `endpoint`, given up after `timeout` seconds, but only before it first connected."""
-    retry = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
-    connect = {"endpoints": [endpoint], "timeout_ms": max(1, round(timeout * 1000)), "retry": retry}
-    return {"mode": "client", "connect": connect, **_settings()}
+    connect = {"endpoints": [endpoint], "timeout_ms": max(1, round(timeout * 1000)), "retry": _RETRY}
+    return {"mode": "client", "connect": connect, **_settings(credentials)}
 
 
-def router_settings(listen: str) -> dict[str, Any]:
-    """A router that listens on one endpoint."""
-    return {"mode": "router", "listen": {"endpoints": [listen]}, **_settings()}
+def router_settings(listen: str, credentials: Credentials | None = None, others: Sequence[str] = ()) -> dict[str, Any]:
+    """A router that listens on one endpoint; with credentials, it lets through only what the rules with them allow.
+
+    It connects to `others`, other routers, as soon as they are there, and again whenever a connection was lost.
+    """
+    connect = {"endpoints": [*others], "timeout_ms": -1, "exit_on_failure": False, "retry": _RETRY}
+    rules = {} if credentials is None else {"access_control": credentials.access_rules()}
+    return {"mode": "router", "listen": {"endpoints": [listen]}, "connect": connect, **_settings(credentials), **rules}
 
 
-def _settings() -> dict[str, Any]:
+def _settings(credentials: Credentials | None) -> dict[str, Any]:
     """No search for others, no shared memory (an upstream race), and the limits above."""
+    link: dict[str, Any] = {"tx": {"lease": round(LEASE * 1000)}, "rx": {"max_message_size": MAX_MESSAGE}}
+    if credentials is not None:
+        link |= {"protocols": ["tls"], "tls": _tls(credentials)}
     return {
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "transport": {
-            "shared_memory": {"enabled": False},
-            "link": {"tx": {"lease": round(LEASE * 1000)}, "rx": {"max_message_size": MAX_MESSAGE}},
-        },
+        "transport": {"shared_memory": {"enabled": False}, "link": link},
+    }
+
+
+def _tls(credentials: Credentials) -> dict[str, Any]:
+    """Each side shows its certificate and checks the other's; the connecting side also that it is the host it called."""
+    certificate, key = str(credentials.certificate), str(credentials.key)
+    return {
+        "root_ca_certificate": str(credentials.ca),
+        "enable_mtls": True,
+        "listen_certificate": certificate,
+        "listen_private_key": key,
+        "connect_certificate": certificate,
+        "connect_private_key": key,
+        "verify_name_on_connect": True,
+        "close_link_on_expiration": True,
     }
 
 

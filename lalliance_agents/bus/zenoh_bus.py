@@ -18,6 +18,7 @@ from typing import Any, Protocol, TypeVar
 import zenoh
 
 from lalliance_agents.bus.base import Answer, Delivery, Handler, PresenceHandler, Sample
+from lalliance_agents.bus.credentials import Credentials, check_fits
 from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, QueuedBus, answers, check_timeout
 from lalliance_agents.bus.patterns import check_key, check_pattern
 from lalliance_agents.bus.session import (
@@ -52,24 +53,44 @@ class _Entity(Protocol):
     def undeclare(self) -> None: ...
 
 
-async def open_bus(endpoint: str, *, timeout: float = 5.0) -> "ZenohBus":  # noqa: ASYNC109 - the bus's own limit, not a cancellation
+async def open_bus(
+    endpoint: str,
+    *,
+    timeout: float = 5.0,  # noqa: ASYNC109 - the bus's own limit, not a cancellation
+    credentials: Credentials | None = None,
+) -> "ZenohBus":
     """Connect to the router at `endpoint`, for example `tcp/127.0.0.1:7447`, within `timeout` seconds.
+
+    Args:
+        endpoint: where the router listens.
+        timeout: how long to try, in seconds.
+        credentials: what to show a router that asks who is there; None: there is nothing to show.
 
     Raises:
         BusError: if `endpoint` is not an endpoint, or no router answers there in time.
+        KeysError: if it asks for credentials and there are none, or the other way round.
     """
     check_endpoint(endpoint)
+    check_fits(endpoint, credentials)
     check_timeout(timeout)
     try:
         async with asyncio.timeout(timeout + 0.5):  # Zenoh keeps the limit itself, but for what it does not foresee
-            session = await open_session(client_settings(endpoint, timeout))
+            session = await open_session(client_settings(endpoint, timeout, credentials))
     except (zenoh.ZError, TimeoutError) as error:
         raise BusError(
             f"No router could be reached at {endpoint} within {timeout:g} s: check that a router is running there, that "
-            "host, port and protocol are right, that no firewall is in between, and, if the router asks for them, "
-            "certificates or password."
+            f"host, port and protocol are right, that no firewall is in between, and {_of_keys(credentials)}."
         ) from error
     return ZenohBus(session, endpoint)
+
+
+def _of_keys(credentials: Credentials | None) -> str:
+    if credentials is None:
+        return "that it asks for no keys"
+    return (
+        f"that the keys in {credentials.folder} come from the same `lalliance keys init` as the router's, which must have "
+        "been told the router's host name"
+    )
 
 
 class ZenohBus(QueuedBus):

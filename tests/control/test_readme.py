@@ -37,7 +37,8 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
 
 TOGETHER = [block for block in blocks("console") if "lalliance router" in block]
 CHAOS = [block for block in blocks("console") if "lalliance chaos" in block]
-ALONE = [command for block in blocks("console") if block not in TOGETHER + CHAOS for command in commands(block)]
+KEYS = [block for block in blocks("console") if "lalliance keys" in block]
+ALONE = [command for block in blocks("console") if block not in TOGETHER + CHAOS + KEYS for command in commands(block)]
 
 
 @pytest.mark.parametrize("command", ALONE, ids=" ".join)
@@ -86,6 +87,14 @@ def test_faults_are_injected_and_healed_while_a_mission_runs(processes: Processe
     assert "partition lifter carrier" in said[3]
 
 
+def test_a_mission_runs_with_keys(processes: Processes) -> None:
+    [block] = KEYS
+    for command in commands(block):
+        done = processes.run(*command)
+        assert done.returncode == 0, done.stderr
+    assert "Mission material_handling complete" in done.stdout
+
+
 def test_each_example_of_a_fault_is_one_and_every_kind_has_an_example() -> None:
     examples = re.findall(r"^\| \w+ \| `(\{.*?\})` \|", README, flags=re.MULTILINE)
     mission = (MISSIONS / "material_handling.yaml").read_text()
@@ -102,5 +111,5 @@ def planned(mission: str, fault: str) -> str:
 
 def test_every_command_of_the_tool_is_in_the_readme(processes: Processes) -> None:
     listed = re.findall(r"^  (\w+)  ", processes.run("--help").stdout, flags=re.MULTILINE)
-    assert len(listed) == 9
+    assert len(listed) == 14
     assert [name for name in listed if f"lalliance {name}" not in README] == []

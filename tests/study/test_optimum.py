@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from study.problems import best_of_all, drawn, mission_of, tables
 
 from lalliance_agents.errors import UserError
+from lalliance_agents.extras import MissingExtraError
 from lalliance_study import bounds
 from lalliance_study.assignments import (
     Floats,
@@ -20,7 +21,6 @@ from lalliance_study.assignments import (
     rebalance,
     to_the_earliest,
 )
-from lalliance_study.extras import MissingExtraError
 from lalliance_study.optimum import NoYardstickError, Optimum, SharedOptimum, optimum, optimum_of
 
 INF = math.inf

@@ -9,12 +9,13 @@ import sys
 import tempfile
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+TESTS = Path(__file__).parents[1]
+MISSIONS = TESTS.parent / "missions"
 _MARK = "LALLIANCE_TEST"
 
 
@@ -43,14 +44,14 @@ class Processes:
             process.communicate()
         self._temporary.cleanup()
 
-    def start(self, *arguments: str | Path) -> "subprocess.Popen[str]":
-        """Start `lalliance` with `arguments`; its output is piped."""
-        return self.start_module("mission_control", *arguments)
+    def start(self, *arguments: str | Path, within: Sequence[str] = ()) -> "subprocess.Popen[str]":
+        """Start `lalliance` with `arguments`, by the command `within` if there is one; its output is piped."""
+        return self.start_module("mission_control", *arguments, within=within)
 
-    def start_module(self, module: str, *arguments: str | Path) -> "subprocess.Popen[str]":
-        """Start a module of Python with `arguments`; its output is piped."""
+    def start_module(self, module: str, *arguments: str | Path, within: Sequence[str] = ()) -> "subprocess.Popen[str]":
+        """Start a module of Python with `arguments`, by the command `within` if there is one; its output is piped."""
         process = subprocess.Popen(
-            [sys.executable, "-m", module, *map(str, arguments)],
+            [*within, sys.executable, "-m", module, *map(str, arguments)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -59,6 +60,7 @@ class Processes:
             env={
                 **os.environ,
                 _MARK: self._mark,
+                "PYTHONPATH": os.pathsep.join([str(TESTS), os.environ.get("PYTHONPATH", "")]),
                 "COLUMNS": "120",
                 "XDG_RUNTIME_DIR": str(self.folder),
                 "TMPDIR": str(self.temporary),

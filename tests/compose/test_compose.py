@@ -1,0 +1,118 @@
+"""The deployment as it is shipped: the real image, the compose file, and containers that die, hang and lose the network."""
+
+import json
+import os
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+import yaml
+from deployment import ROOT, Deployment, docker, until
+
+pytestmark = pytest.mark.timeout(600)
+
+DEMO = ROOT / "missions/material_handling.yaml"
+TWO_TASKS = Path(__file__).with_name("mission.yaml")
+
+
+def test_the_image_is_small_and_has_no_root(image: str) -> None:
+    [ours], [base] = (json.loads(docker("image", "inspect", name)) for name in (image, os.environ["BASE_IMAGE"]))
+    added = (ours["Size"] - base["Size"]) / 1e6
+    assert added < 250, f"{added:.0f} MB over its base"
+    assert ours["Config"]["User"] == "10001:10001"
+    assert ours["Config"]["Healthcheck"]["Test"] == ["CMD", "lalliance", "health"]
+
+
+def test_every_service_is_confined(deployed) -> None:
+    """As compose understands the file, whatever its text says."""
+    shown = yaml.safe_load(deployed(DEMO, ROOT / "deploy/compose.yaml").run("--profile", "*", "config"))
+    assert [network.get("internal") for network in shown["networks"].values()] == [True]
+    assert len(shown["services"]) == 8
+    for service in shown["services"].values():
+        assert service["read_only"]
+        assert service["init"]
+        assert service["cap_drop"] == ["ALL"]
+        assert service["user"] == "10001:10001"
+        assert "ports" not in service
+        assert len([one for one in service["volumes"] if one["target"].startswith("/keys")]) <= 1
+
+
+def test_the_demo_mission_is_completed_although_a_container_is_killed(deployed) -> None:
+    demo: Deployment = deployed(DEMO, ROOT / "deploy/compose.yaml")
+    demo.up("material_handling")
+    task = demo.wait_for(r"lifter starts (crate-[\w]+)")[1]
+    demo.run("kill", "robot-lifter")
+    demo.wait_for(rf"takes {task} from lifter \(silence\)")
+    assert "Mission material_handling complete: makespan" in demo.run("run", "--rm", "--no-TTY", "summary")
+    words = ["summary", "/var/lib/lalliance/world/summary.json", "--json"]
+    summary = json.loads(demo.run("run", "--rm", "--no-TTY", "summary", *words))
+    assert summary["complete"]
+    assert (task, "lifter", "silence") in {(one["task"], one["from"], one["cause"]) for one in summary["takeovers"]}
+    # The world and the robots that live have ended by themselves, and nobody starts them again.
+    for service in ("world", "robot-carrier", "robot-pusher", "robot-forklift"):
+        until(lambda service=service: demo.facts(service)["State"]["Status"] == "exited", f"{service} ends")
+        assert demo.facts(service)["State"]["ExitCode"] == 0
+
+
+def test_whatever_fails_the_mission_goes_on(deployed) -> None:
+    """In turn: a robot killed, one paused, one off the network, one behind a bad line, the router, the world."""
+    team: Deployment = deployed(TWO_TASKS)
+    team.up("two_tasks")
+
+    def busy() -> tuple[str, str]:
+        """A robot that is alone on a task, and which that is, when all are there."""
+        until(lambda: all(map(team.is_there, ("ada", "bob", "dan", "eve"))), "all are there")
+        until(lambda: {"north", "south"} <= set(team.workers().values()), "both tasks have a robot")
+        on = list(team.workers().items())
+        return next((robot, task) for robot, task in on if [other for _, other in on].count(task) == 1)
+
+    robot, task = busy()
+    team.run("kill", f"robot-{robot}")
+    team.wait_for(rf"takes {task} from {robot} \(silence\)")
+    team.run("start", f"robot-{robot}")
+
+    robot, task = busy()
+    team.run("pause", f"robot-{robot}")
+    team.wait_for(rf"takes {task} from {robot} \(silence\)")
+    team.run("unpause", f"robot-{robot}")
+
+    robot, task = busy()
+    with team.disconnected(f"robot-{robot}"):
+        team.wait_for(rf"takes {task} from {robot} \(silence\)")
+
+    robot, _ = busy()
+    with team.slowed(f"robot-{robot}", delay=100, jitter=20, loss=15) as line:
+        answers = [team.run("run", "--rm", "--no-TTY", "operator") for _ in range(2)]
+    assert all(answer.startswith("Mission two_tasks: running") for answer in answers)
+    assert line["packets"] > 20
+    assert line["lost"] > 0
+
+    restarts = team.facts("router")["RestartCount"]
+    team.strike("router")
+    until(lambda: team.restarted("router", restarts), "the router is started again")
+    team.run("up", "--detach", "--pull", "never", "--force-recreate", "--no-deps", "router")
+
+    restarts = team.facts("world")["RestartCount"]
+    team.strike("world")
+    until(lambda: team.restarted("world", restarts), "the world is started again")
+
+    printed = team.run("run", "--rm", "--no-TTY", "summary", timeout=400)
+    assert "Mission two_tasks complete" in printed
+
+
+def test_a_robot_is_heard_within_three_seconds_of_its_start(deployed) -> None:
+    team: Deployment = deployed(TWO_TASKS)
+    team.up("two_tasks")
+    before = team.wait_for(r"heard ada first at ([\d.]+)")[1]
+    team.run("kill", "robot-ada")
+    team.run("start", "robot-ada")
+    until(lambda: team.wait_for(r"heard ada first at ([\d.]+)")[1] != before, "ada is heard in its next life")
+    heard = float(team.wait_for(r"heard ada first at ([\d.]+)")[1])
+    started = datetime.fromisoformat(team.facts("robot-ada")["State"]["StartedAt"][:26] + "+00:00").timestamp()
+    print(f"\na robot was heard {heard - started:.2f} s after its start, with a load of {os.getloadavg()[0]:.1f}")
+    assert 0 < (heard - started) / slowness() < 3.0
+
+
+def slowness() -> float:
+    """How many times more there is to run on this machine just now than it has processors."""
+    return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
