@@ -68,19 +68,27 @@ def log_ratio(ours: Floats, theirs: Floats) -> LogRatio:
     return LogRatio(value, float(pulls.std(ddof=1)) / math.sqrt(len(pulls)), len(pulls) - 1)
 
 
-def pooled(parts: Sequence[LogRatio]) -> LogRatio:
-    """The mean of log ratios of independent scenarios, all of one weight: the logarithm of their geometric mean.
+def pooled(parts: Sequence[Sequence[LogRatio]]) -> LogRatio:
+    """The mean of log ratios, all of one weight: the logarithm of the geometric mean of the ratios.
 
-    The scenarios are what was asked for and not a sample of others, so only missions within scenarios make it uncertain.
-    Degrees of freedom after Welch and Satterthwaite. A scenario of one mission makes the error unknown.
+    Those of one part come from the same missions, and their errors are taken as wholly alike, which is the worst case; parts
+    are independent. The scenarios are what was asked for and not a sample of others, so only the missions within them make the
+    mean uncertain. Degrees of freedom after Welch and Satterthwaite. A scenario of one mission makes the error unknown.
     """
-    errors = np.array([part.error for part in parts])
-    variance = float((errors**2).sum())
-    shares = errors**4 / np.maximum([part.freedom for part in parts], 1e-300)
-    lowest = min(part.freedom for part in parts)
-    freedom = variance**2 / float(shares.sum()) if shares.sum() > 0 else lowest
-    value = float(np.mean([part.value for part in parts]))
-    return LogRatio(value, math.sqrt(variance) / len(parts), freedom if lowest > 0 else 0)
+    ratios = [one for part in parts for one in part]
+    errors = np.array([sum(one.error for one in part) for part in parts])
+    freedoms = np.array([min(one.freedom for one in part) for part in parts], dtype=np.float64)
+    error = math.sqrt(float((errors**2).sum())) / len(ratios)
+    value = float(np.mean([one.value for one in ratios]))
+    return LogRatio(value, error, _freedom(errors**2, freedoms))
+
+
+def _freedom(variances: Floats, freedoms: Floats) -> float:
+    """Welch's and Satterthwaite's degrees of freedom of a sum of independent values."""
+    if freedoms.min() <= 0:
+        return 0.0
+    shares = float((variances**2 / freedoms).sum())
+    return float(variances.sum()) ** 2 / shares if shares > 0 else float(freedoms.min())
 
 
 def pooled_mean(samples: Sequence[Floats], confidence: float = CONFIDENCE) -> Estimate:
@@ -89,9 +97,8 @@ def pooled_mean(samples: Sequence[Floats], confidence: float = CONFIDENCE) -> Es
     if min(len(sample) for sample in samples) < 2:
         return Estimate(centre, math.nan, math.nan)
     variances = np.array([sample.var(ddof=1) / len(sample) for sample in samples])
-    total = float(variances.sum())
-    shares = float(sum(part**2 / (len(sample) - 1) for part, sample in zip(variances, samples, strict=True)))
-    reach = _student(confidence, total**2 / shares) * math.sqrt(total) / len(samples) if shares > 0 else 0.0
+    freedom = _freedom(variances, np.array([len(sample) - 1.0 for sample in samples]))
+    reach = _student(confidence, freedom) * math.sqrt(float(variances.sum())) / len(samples)
     return Estimate(centre, centre - reach, centre + reach)
 
 

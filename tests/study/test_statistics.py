@@ -38,7 +38,7 @@ def test_one_mission_gives_a_value_and_no_interval():
     found = statistics.log_ratio(np.array([3.0]), np.array([2.0])).ratio()
     assert found.value == pytest.approx(1.5)
     assert math.isnan(found.low)
-    assert math.isnan(statistics.pooled([statistics.log_ratio(np.array([3.0]), np.array([2.0]))]).ratio().low)
+    assert math.isnan(statistics.pooled([[statistics.log_ratio(np.array([3.0]), np.array([2.0]))]]).ratio().low)
 
 
 def test_the_interval_of_a_ratio_is_that_of_the_bootstrap():
@@ -76,16 +76,23 @@ def test_equal_samples_have_a_ratio_of_exactly_one():
     ours, _ = _skewed(3, 20)
     alike = statistics.log_ratio(ours, ours)
     assert alike.ratio() == (1.0, 1.0, 1.0)
-    assert statistics.pooled([alike, alike]).ratio() == (1.0, 1.0, 1.0)
+    assert statistics.pooled([[alike], [alike]]).ratio() == (1.0, 1.0, 1.0)
 
 
 def test_pooled_scenarios_have_their_geometric_mean_and_a_smaller_error():
     parts = [statistics.log_ratio(*_skewed(seed, 100)) for seed in range(16)]
-    found = statistics.pooled(parts)
+    found = statistics.pooled([[part] for part in parts])
     assert math.exp(found.value) == pytest.approx(float(stats.gmean([part.ratio().value for part in parts])))
     assert found.error == pytest.approx(math.sqrt(sum(part.error**2 for part in parts)) / 16)
     assert min(part.freedom for part in parts) <= found.freedom <= sum(part.freedom for part in parts)
-    assert statistics.pooled(parts[:1]).ratio() == pytest.approx(parts[0].ratio())
+    assert statistics.pooled([parts[:1]]).ratio() == pytest.approx(parts[0].ratio())
+
+
+def test_ratios_of_the_same_missions_add_no_certainty():
+    """The same ratio twice from the same missions is as sure as it is once; from others it is surer."""
+    part = statistics.log_ratio(*_skewed(5, 100))
+    assert statistics.pooled([[part, part]]) == pytest.approx(part)
+    assert statistics.pooled([[part], [part]]).error == pytest.approx(part.error / math.sqrt(2))
 
 
 def test_a_pooled_mean_of_one_scenario_is_its_mean():

@@ -1,0 +1,129 @@
+"""What the study measured, as the report uses it: per scenario the makespans of all contenders on the same missions."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lalliance_agents.errors import UserError
+from lalliance_study.experiments.manifest import Asked, Manifest
+from lalliance_study.experiments.rows import read
+from lalliance_study.report.comparisons import Comparison, compare
+from lalliance_study.report.statistics import Floats
+from lalliance_study.scenarios import Scenario
+
+if TYPE_CHECKING:
+    import polars as pl
+
+#: With fewer missions a scenario no verdict is given.
+FEWEST = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One scenario and what came of it. Arrays are `[missions]`, times in seconds, not a number where there is none."""
+
+    number: int
+    draws: int
+    """Scenarios of the same draws have the same missions."""
+    scenario: Scenario
+    times: Mapping[str, Floats]
+    """Makespans, by contender; not a number where a mission was not finished."""
+    optimum: Floats
+    """HRASP's, or the best schedule known."""
+    bound: Floats
+    """What is proven that no schedule is shorter than."""
+    proven: NDArray[np.bool_]
+    """Whether these two are the same."""
+    shared: Floats
+    """The optimum where the work left belongs to the task."""
+
+    @property
+    def missions(self) -> int:
+        """How many."""
+        return len(self.optimum)
+
+    def compare(self, first: str, second: str) -> Comparison:
+        """Two contenders on these missions."""
+        return compare(self.number, self.draws, self.scenario, self.times[first], self.times[second])
+
+    def ratios(self, contender: str, yardstick: Floats | None = None) -> Floats:
+        """A contender's makespans over the optimum, or another yardstick, of those missions that it finished."""
+        found = self.times[contender] / (self.optimum if yardstick is None else yardstick)
+        return found[np.isfinite(found)]
+
+
+class Results:
+    """The results of a study in a folder, read an experiment at a time."""
+
+    def __init__(self, folder: Path) -> None:
+        """Look at what is there.
+
+        Raises:
+            UserError: it is no study, or one of another version.
+        """
+        self.folder = folder
+        self.manifest = Manifest.read(folder)
+        self._read: dict[str, list[Measured]] = {}
+
+    @cached_property
+    def asked(self) -> dict[str, Asked]:
+        """The experiments of the study, by name."""
+        return {one.name: one for one in self.manifest.experiments}
+
+    def of(self, experiment: str, wanted: Callable[[Scenario], bool] = lambda _: True) -> list[Measured]:
+        """What was measured in those scenarios of an experiment that are wanted; none if it is no part of the study.
+
+        Raises:
+            UserError: rows that cannot be read.
+        """
+        if experiment not in self._read:
+            self._read[experiment] = list(self._measured(experiment)) if experiment in self.asked else []
+        return [one for one in self._read[experiment] if wanted(one.scenario)]
+
+    def _measured(self, experiment: str) -> Iterator[Measured]:
+        rows = read(self.folder, [experiment])
+        planned = {one.number: one for one in self.manifest.scenarios}
+        for (number,), own in rows.group_by("scenario", maintain_order=True):
+            one = planned[int(str(number))]
+            by_contender = dict(_by_contender(own))
+            missions = {tuple(part["mission"]) for part in by_contender.values()}
+            if len(missions) != 1 or len(by_contender) != len(self.asked[experiment].contenders):
+                raise UserError(
+                    f"{self.folder}: scenario {number} of {experiment} has not the same missions for all contenders; "
+                    "expected what lalliance study run wrote"
+                )
+            first = next(iter(by_contender.values()))
+            yield Measured(
+                number=one.number,
+                draws=one.draws,
+                scenario=one.scenario,
+                times={name: _floats(part, "makespan") for name, part in by_contender.items()},
+                optimum=_floats(first, "optimum"),
+                bound=_floats(first, "bound"),
+                proven=first["proven"].fill_null(value=False).to_numpy().astype(np.bool_),
+                shared=_floats(first, "shared_optimum"),
+            )
+
+
+def _by_contender(rows: "pl.DataFrame") -> Iterator[tuple[str, "pl.DataFrame"]]:
+    for (name,), own in rows.group_by("contender", maintain_order=True):
+        yield str(name), own
+
+
+def _floats(rows: "pl.DataFrame", column: str) -> Floats:
+    """A column, with what is missing as not a number."""
+    return rows[column].fill_null(np.nan).to_numpy().astype(np.float64)
+
+
+def by(
+    found: Sequence[Measured], key: Callable[[Scenario], float | str]
+) -> dict[float | str, list[Measured]]:
+    """Scenarios in groups, in the order of the groups' keys."""
+    ordered = sorted(found, key=lambda one: (key(one.scenario), one.number))
+    return {value: list(group) for value, group in groupby(ordered, key=lambda one: key(one.scenario))}
