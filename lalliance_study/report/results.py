@@ -121,9 +121,7 @@ def _floats(rows: "pl.DataFrame", column: str) -> Floats:
     return rows[column].fill_null(np.nan).to_numpy().astype(np.float64)
 
 
-def by(
-    found: Sequence[Measured], key: Callable[[Scenario], float | str]
-) -> dict[float | str, list[Measured]]:
+def by(found: Sequence[Measured], key: Callable[[Scenario], float | str]) -> dict[float | str, list[Measured]]:
     """Scenarios in groups, in the order of the groups' keys."""
     ordered = sorted(found, key=lambda one: (key(one.scenario), one.number))
     return {value: list(group) for value, group in groupby(ordered, key=lambda one: key(one.scenario))}
