@@ -15,13 +15,14 @@ does in use: `random` and `auction` place the lost tasks alone and keep all othe
 that nobody has begun.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from lalliance_study.assignments import Owners, longest_first, to_the_earliest
+from lalliance_study.assignments import Floats, Owners, longest_first, to_the_earliest
 from lalliance_study.cbba import cbba
-from lalliance_study.optimum import optimum
+from lalliance_study.optimum import Optimum, optimum
 from lalliance_study.queues import Plan, Planner, Situation
 
 #: How near to the optimum `optimum` plans: the ratios of the study are told to three digits.
@@ -86,25 +87,28 @@ def lpt(situation: Situation) -> Plan:
     return _queues(situation, owner, order)
 
 
-def repaired_optimum(tolerance: float = TOLERANCE, work_limit: float = WORK_LIMIT) -> Planner:
+def repaired_optimum(solve: Callable[[Floats, Floats], Optimum]) -> Planner:
     """A planner of HRASP's optimum for all tasks that nobody has begun, given when robots are through with what they are on.
 
     It is the optimum if nobody dies. If robots do, it is not the best that a clairvoyant could do. The order within a queue
     does not matter to the makespan; the shortest come first, so that a death finds most tasks done.
 
     Args:
-        tolerance: as of `optimum`.
-        work_limit: as of `optimum`.
+        solve: finds an optimum, given times and from when robots are free.
     """
 
     def plan(situation: Situation) -> Plan:
         times = situation.times[:, situation.open]
-        found = optimum(times, ready=situation.ready, tolerance=tolerance, work_limit=work_limit)
+        found = solve(times, situation.ready)
         owner = np.array(found.assignment, dtype=np.intp)
         order = np.argsort(times[owner, np.arange(len(owner))], kind="stable")
         return _queues(situation, owner, order)
 
     return plan
+
+
+def _optimum(times: Floats, ready: Floats) -> Optimum:
+    return optimum(times, ready=ready, tolerance=TOLERANCE, time_limit=math.inf, work_limit=WORK_LIMIT)
 
 
 def _queues(situation: Situation, owner: Owners, order: Owners) -> list[list[int]]:
@@ -122,5 +126,5 @@ BASELINES: Mapping[str, Planner] = {
     "auction": auction,
     "cbba": cbba,
     "lpt": lpt,
-    "optimum": repaired_optimum(),
+    "optimum": repaired_optimum(_optimum),
 }

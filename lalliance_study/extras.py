@@ -1,4 +1,7 @@
-"""Packages that only the study needs. They are looked for when they are used, so that the rest runs without them."""
+"""Packages that only the study needs, or only a study on several machines.
+
+They are looked for when they are used, so that the rest runs without them.
+"""
 
 from importlib import import_module
 from types import ModuleType
@@ -7,11 +10,11 @@ from lalliance_agents.errors import UserError
 
 
 class MissingExtraError(UserError):
-    """A package of the study extra is not installed."""
+    """A package of an extra is not installed."""
 
 
-def study_package(module: str) -> ModuleType:
-    """A module of a package of the study extra.
+def study_package(module: str, extra: str = "study") -> ModuleType:
+    """A module of a package of the study extra, or of another one.
 
     Raises:
         MissingExtraError: it is not installed.
@@ -21,5 +24,5 @@ def study_package(module: str) -> ModuleType:
     except ModuleNotFoundError as error:
         raise MissingExtraError(
             f"this needs the package {(error.name or module).partition('.')[0]}, which is not installed; "
-            "expected the study extra: pip install 'lalliance[study]'"
+            f"expected the {extra} extra: pip install 'lalliance[{extra}]'"
         ) from None

@@ -175,6 +175,7 @@ class _State:
         solver = cp_model.CpSolver()
         solver.parameters.num_workers = 1
         solver.parameters.random_seed = 0
+        solver.parameters.catch_sigint_signal = False  # else Ctrl-C would make an ordinary answer of what it has
         solver.parameters.relative_gap_limit = 0.4 * self._tolerance
         solver.parameters.max_time_in_seconds = time_limit
         solver.parameters.max_deterministic_time = work_limit

@@ -7,7 +7,7 @@ of.
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -25,7 +25,7 @@ AHEAD = 3
 T = TypeVar("T")
 
 
-def at_once(work: Callable[..., T], parts: Iterable[tuple[Any, ...]], jobs: int | None) -> Iterator[T]:
+def at_once(work: Callable[..., T], parts: Iterable[tuple[Any, ...]], jobs: int | None) -> Generator[T, None, None]:
     """What `work` returns for each of `parts`, in the order in which that comes.
 
     Args:
@@ -40,7 +40,7 @@ def at_once(work: Callable[..., T], parts: Iterable[tuple[Any, ...]], jobs: int 
     return (work(*part) for part in parts) if jobs == 1 else _in_processes(work, iter(parts), jobs)
 
 
-def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs: int) -> Iterator[T]:
+def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs: int) -> Generator[T, None, None]:
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(os.getpid(),))
     waiting: set[Future[T]] = set()

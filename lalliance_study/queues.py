@@ -1,8 +1,9 @@
 """What a plan is, and what becomes of it: robots work through queues of tasks, die, and somebody plans anew.
 
 This is the stage on which `baselines` are compared with L-ALLIANCE. It works on plain arrays: `times[robots, tasks]`, the
-seconds a robot needs for a task, infinite where it cannot do it, and `deaths[robots]`, the instants at which robots die
-silently, infinite where they do not. It keeps to the world's model of the task pool:
+seconds a robot needs for a task, infinite where it cannot do it; `deaths[robots]`, the instants at which robots die silently;
+and `lives[robots]`, how long they can work before they do; infinite where they do not. It keeps to the world's model of the
+task pool:
 
 - a robot does one task at a time, its queue in order, and never leaves a task that it has begun;
 - a death interrupts the robot's task. With `restart` that attempt's work is lost; with `shared_max` and `shared_add` the work
@@ -79,6 +80,7 @@ def carry_out(
     times: Floats,
     deaths: Floats | None = None,
     *,
+    lives: Floats | None = None,
     hand_over: HandOver = "restart",
     detection: float = DETECTION,
     seed: int = 0,
@@ -89,6 +91,7 @@ def carry_out(
         planner: makes the plans.
         times: as above.
         deaths: as above; by default nobody dies.
+        lives: as above; by default all can work for ever.
         hand_over: what is left of a task whose robot has died.
         detection: how long a death goes unnoticed, in seconds.
         seed: of all that the planner draws.
@@ -99,24 +102,45 @@ def carry_out(
         ValueError: the planner's plan is none.
     """
     table = check_times(times)
-    dies = np.full(len(table), math.inf) if deaths is None else np.asarray(deaths, dtype=np.float64)
-    if dies.shape != (len(table),) or not (dies >= 0).all():
-        raise UserError(f"deaths is {dies}; expected an instant of at least 0 for each of {len(table)} robots")
+    dies = _of_each_robot(table, "deaths", deaths)
+    lasts = _of_each_robot(table, "lives", lives)
     if not 0 <= detection < math.inf:
         raise UserError(f"a death is noticed after {detection:g} s; expected a finite time of at least 0")
-    run = _Run(planner, table, dies, detection, shared=hand_over != "restart", seed=seed)
+    run = _Run(planner, table, dies, lasts, detection, shared=hand_over != "restart", seed=seed)
     run.to_the_end()
     return Outcome(max(run.done_at, default=0.0), tuple(run.done_at), tuple(run.done_by), run.reallocations, run.plans)
+
+
+def _of_each_robot(times: Floats, what: str, given: Floats | None) -> Floats:
+    """A time of each robot, `[robots]` in seconds; infinite if none is given.
+
+    Raises:
+        UserError: it is none.
+    """
+    made = np.full(len(times), math.inf) if given is None else np.array(given, dtype=np.float64)
+    if made.shape != (len(times),) or not (made >= 0).all():
+        raise UserError(f"{what} is {made}; expected a time of at least 0 for each of {len(times)} robots")
+    return made
 
 
 class _Run:
     """A mission that is being carried out."""
 
     def __init__(
-        self, planner: Planner, times: Floats, deaths: Floats, detection: float, *, shared: bool, seed: int
+        self,
+        planner: Planner,
+        times: Floats,
+        deaths: Floats,
+        lives: Floats,
+        detection: float,
+        *,
+        shared: bool,
+        seed: int,
     ) -> None:
         robots, tasks = times.shape
-        self._planner, self._times, self._deaths, self._shared = planner, times, deaths, shared
+        self._planner, self._times, self._shared, self._detection = planner, times, shared, detection
+        #: When each robot dies, by all that is known so far, and how long it can still work.
+        self._deaths, self._lives = deaths, lives
         self._chance = np.random.default_rng(seed)
         self._now = 0.0
         self._left = np.ones(tasks)
@@ -127,7 +151,6 @@ class _Run:
         self._ends = np.full(robots, math.inf)
         self._dead = [False] * robots
         self._known_dead = [False] * robots
-        self._noticed = deaths + detection
         self._owner: dict[int, int] = {}
         self.done_at = [math.inf] * tasks
         self.done_by = [-1] * tasks
@@ -152,7 +175,7 @@ class _Run:
         if self._known_dead[robot]:
             return math.inf
         if self._dead[robot]:
-            return float(self._noticed[robot])
+            return float(self._deaths[robot] + self._detection)
         return float(min(self._ends[robot], self._deaths[robot]))
 
     def _begin(self) -> None:
@@ -162,11 +185,14 @@ class _Run:
                 self._on[robot] = task = queue.pop(0)
                 self._began[robot] = self._now
                 self._ends[robot] = self._now + self._left[task] * self._times[robot, task]
+                if self._now + self._lives[robot] < self._ends[robot]:
+                    self._deaths[robot] = min(self._deaths[robot], self._now + self._lives[robot])
 
     def _finish(self, robot: int) -> None:
         task = self._on[robot]
         if task is not None and not self._dead[robot] and self._ends[robot] <= self._now:
             self.done_at[task], self.done_by[task] = self._now, robot
+            self._lives[robot] -= self._now - self._began[robot]
             self._on[robot], self._ends[robot] = None, math.inf
 
     def _die(self, robot: int) -> None:
@@ -181,7 +207,7 @@ class _Run:
         """Take from the dead that are noticed now what they were to do, and plan anew if that is anything."""
         left_behind = False
         for robot, dead in enumerate(self._dead):
-            if dead and not self._known_dead[robot] and self._noticed[robot] <= self._now:
+            if dead and not self._known_dead[robot] and self._deaths[robot] + self._detection <= self._now:
                 self._known_dead[robot] = True
                 left_behind = left_behind or self._on[robot] is not None or bool(self._queues[robot])
                 self._on[robot], self._ends[robot] = None, math.inf

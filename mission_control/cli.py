@@ -25,6 +25,7 @@ from mission_control.campaign_command import campaign
 from mission_control.chaos import chaos
 from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
 from mission_control.simulate import simulate
+from mission_control.study_command import study
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -286,6 +287,7 @@ def schema() -> None:
 
 
 app.add_typer(chaos, name="chaos")
+app.add_typer(study, name="study")
 
 
 def _load(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":

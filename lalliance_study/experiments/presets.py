@@ -123,7 +123,9 @@ ABLATION = Experiment(
     Grid(
         ((5, 10, 3),),
         (100.0, 800.0),
-        circumstances=(PLAIN, DYING, STUCK, {"samples": 0}, {"samples": 0, "training": 3}),
+        circumstances=tuple(
+            {**befalls, "cap": 1.0} for befalls in (PLAIN, DYING, STUCK, {"samples": 0}, {"samples": 0, "training": 3})
+        ),
     ),
     (DEFAULT, *read_otherwise()),
     share=0.1,

@@ -183,8 +183,8 @@ def test_a_death_that_leaves_nothing_to_do_changes_no_plan() -> None:
 @pytest.mark.parametrize(
     ("deaths", "detection", "sentence"),
     [
-        ([1.0], 1.0, "expected an instant of at least 0 for each of 2 robots"),
-        ([1.0, -1.0], 1.0, "expected an instant of at least 0"),
+        ([1.0], 1.0, "expected a time of at least 0 for each of 2 robots"),
+        ([1.0, -1.0], 1.0, "expected a time of at least 0"),
         ([1.0, INF], INF, "a death is noticed after inf s; expected a finite time"),
     ],
 )
@@ -214,7 +214,7 @@ def test_larger_teams_with_deaths(coverage: int, heterogeneity: float) -> None:
     deaths = np.where(np.arange(10) % 4 == 1, 150.0, INF)
     assert np.isfinite(times[np.isinf(deaths)]).any(axis=0).all()  # else the mission could not be completed
     found = {name: carry_out(planner, times, deaths, hand_over="restart") for name, planner in BASELINES.items()}
-    found["quick"] = carry_out(repaired_optimum(1e-2, 0.1), times, deaths)
+    found["quick"] = carry_out(repaired_optimum(quick), times, deaths)
     lower = optimum(times).lower
     assert all(lower <= outcome.makespan < INF for outcome in found.values())
     assert all(outcome.reallocations > 0 for outcome in found.values())
