@@ -1,0 +1,138 @@
+"""The page's tables of numbers, each from what one experiment measured."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from lalliance_study.report import statistics
+from lalliance_study.report.beyond import (
+    LEARNERS,
+    PARAMETERS,
+    RIVALS,
+    against_default,
+    against_exact,
+    readings,
+    values_of,
+)
+from lalliance_study.report.claims import circumstances, ratio_of
+from lalliance_study.report.comparisons import Comparison
+from lalliance_study.report.markdown import number, table
+from lalliance_study.report.optima import DERIVED, NEAR, log_mean, proven, size
+from lalliance_study.report.results import Measured
+
+HAND_OVERS = ("shared_max", "shared_add", "restart")
+
+
+def rivals(found: Sequence[Measured]) -> str:
+    """Each rival against the default."""
+    names = {told: name for name, told in RIVALS.items() if name in found[0].times}
+    return _by_rule(found, names, against_default, "relative to II derived")
+
+
+def knowledge(found: Sequence[Measured]) -> str:
+    """Each learner against itself with exact knowledge."""
+    names = {told: name for name, told in LEARNERS.items() if name in found[0].times}
+    return _by_rule(found, names, lambda own, name: list(against_exact(own, name)), "relative to exact knowledge")
+
+
+def ablation(found: Sequence[Measured]) -> str:
+    """Each erratum read otherwise against the default."""
+    names = {told: name for name, told in readings(list(found[0].times)).items()}
+    return _by_rule(found, names, against_default, "relative to the default reading")
+
+
+def sensitivity(found: Sequence[Measured]) -> str:
+    """Each other value of a parameter against the default."""
+    contenders = list(found[0].times)
+    names = {
+        f"{symbol} = {value:g}": name
+        for symbol in PARAMETERS
+        for value, name in sorted(values_of(contenders, symbol).items())
+    }
+    return _by_rule(found, names, against_default, "relative to the default")
+
+
+def _by_rule(
+    found: Sequence[Measured],
+    rows: Mapping[str, str],
+    compared: Callable[[Sequence[Measured], str], Sequence[Comparison]],
+    says: str,
+) -> str:
+    """For each hand-over a table: a row for each contender, a column for what befalls the team or what it knows."""
+    tables = []
+    for rule in HAND_OVERS:
+        own = [one for one in found if one.scenario.hand_over == rule]
+        cells = {told: _by_circumstances(compared(own, name)) for told, name in rows.items()}
+        columns = list(dict.fromkeys(column for line in cells.values() for column in line))
+        body = [[told, *(_cell(line.get(column, [])) for column in columns)] for told, line in cells.items()]
+        if own:
+            tables.append(table([f"{rule}: {says}", *columns], body, right=True))
+    return "\n".join(tables)
+
+
+def _by_circumstances(comparisons: Sequence[Comparison]) -> dict[str, list[Comparison]]:
+    groups: dict[str, list[Comparison]] = {}
+    for one in comparisons:
+        groups.setdefault(circumstances(one.scenario), []).append(one)
+    return groups
+
+
+def _cell(comparisons: Sequence[Comparison]) -> str:
+    """A pooled ratio, and the share of missions left unfinished where that differs."""
+    if not comparisons:
+        return "–"
+    told = number(ratio_of(comparisons), 2)
+    if all(one.only_first == one.only_second for one in comparisons):
+        return told
+    left = sum(one.only_second + one.neither for one in comparisons) / sum(one.missions for one in comparisons)
+    return f"{told}, {left:.1%} unfinished"
+
+
+def distances(found: Sequence[Measured]) -> str:
+    """How far from the optimum, for each hand-over and contender, in the scenarios in which every optimum is proven."""
+    sound = proven(found)
+    body = []
+    for rule in HAND_OVERS:
+        own = [one for one in sound if one.scenario.hand_over == rule]
+        body += [_distance(rule, contender, own) for contender in (own[0].times if own else ())]
+    head = ["hand-over, who", "scenarios", "mean", "p50", "p95", "largest", "missions ≤ 1.20", "scenarios ≤ 1.20"]
+    return table(head, body, right=True)
+
+
+def _distance(rule: str, contender: str, found: Sequence[Measured]) -> list[str]:
+    samples = [ratios for one in found if len(ratios := one.ratios(contender))]
+    every, missions = np.concatenate(samples), sum(one.missions for one in found)
+    near = statistics.proportion(int((every <= NEAR).sum()), missions)
+    means = sum(bool(sample.mean() <= NEAR) for sample in samples)
+    return [
+        f"{rule}, {contender}",
+        str(len(found)),
+        number(statistics.pooled_mean(samples)),
+        number(statistics.quantile(every, 0.5)),
+        number(statistics.quantile(every, 0.95)),
+        f"{every.max():.2f}",
+        f"{near.value:.1%} ({near.low:.1%} to {near.high:.1%})",
+        f"{means} of {len(samples)}",
+    ]
+
+
+def growth(found: Sequence[Measured]) -> str:
+    """The mean ratio at each size and heterogeneity, also to the optimum for robots that share work, and to what is proven."""
+    body = []
+    for one in sorted(found, key=lambda one: (one.scenario.heterogeneity, one.scenario.tasks, one.number)):
+        ratios = one.ratios(DERIVED)
+        if not len(ratios):
+            continue
+        sharing = one.ratios(DERIVED, one.shared)
+        body.append(
+            [
+                f"{one.scenario.heterogeneity:g} %, {size(one.scenario)}, {one.scenario.hand_over}",
+                number(log_mean(ratios).ratio()),
+                number(log_mean(one.ratios("II/shortest_first")).ratio()),
+                number(log_mean(sharing).ratio()) if len(sharing) else "–",
+                f"{int(one.proven.sum())} of {one.missions}",
+                f"{one.ratios(DERIVED, one.bound).mean():.3f}",
+            ]
+        )
+    head = ["", "II derived", "II shortest first", "II derived, to the shared optimum", "proven", "at most"]
+    return table(head, body, right=True)
