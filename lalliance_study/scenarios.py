@@ -17,11 +17,11 @@ import random
 from collections.abc import Iterator
 from itertools import chain
 from itertools import count as counting
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from lalliance_agents.config import EnvironmentChoice, Mission, Phase, RobotSpec, TaskSpec
 from lalliance_agents.model.monitor import Record as Learned
@@ -30,6 +30,7 @@ from lalliance_study.circumstances import Circumstances, Trap
 from world_server.environments.task_pool import HandOver
 
 Floats = NDArray[np.float64]
+Spread: TypeAlias = Literal["unrelated", "related", "log_uniform"]
 
 #: One control step, in seconds: the study's unit of time.
 CONTROL_PERIOD = 0.1
@@ -40,15 +41,15 @@ BASE_STEPS = (100.0, 300.0)
 class Scenario(Record):
     """One point of the study; 200 missions each."""
 
-    robots: int = Field(ge=2, le=20)
+    robots: int = Field(ge=2, le=100)
     """n."""
-    tasks: int = Field(ge=1, le=40)
+    tasks: int = Field(ge=1, le=1000)
     """m."""
-    coverage: int = Field(ge=1, le=20)
-    """How many robots can do each task."""
+    coverage: int = Field(ge=1)
+    """How many robots can do each task, at most all."""
     heterogeneity: NotNegative = 0.0
     """How much longer the slowest able robot takes than the fastest, in percent."""
-    spread: Literal["unrelated", "related", "log_uniform"] = "unrelated"
+    spread: Spread = "unrelated"
     """Times between fastest and slowest: uniform per task, one speed per robot, or log-uniform per task."""
     hand_over: HandOver = "shared_max"
     """What a second robot finds."""
@@ -64,6 +65,12 @@ class Scenario(Record):
     """Trials of active learning before the mission, in which nobody dies or gets stuck."""
     cap: Positive = 4.0
     """A mission is given up after this many times the time in which one slow robot would do all the tasks."""
+
+    @model_validator(mode="after")
+    def _check_coverage(self) -> Self:
+        if self.coverage > self.robots:
+            raise ValueError(f"coverage {self.coverage} is more than the team has, which is {self.robots} robots")
+        return self
 
     @property
     def deadline(self) -> float:
@@ -137,7 +144,7 @@ def draw_missions(scenario: Scenario, count: int, *, seed: int = 0, number: int 
         number: the scenario's number within the study.
     """
     draws = _Draws(seed, number, count)
-    n, m, width = scenario.robots, scenario.tasks, min(scenario.coverage, scenario.robots)
+    n, m, width = scenario.robots, scenario.tasks, scenario.coverage
     able = np.sort(np.argsort(draws.uniform(m, n), axis=-1)[..., :width], axis=-1)
     low, high = (steps * CONTROL_PERIOD for steps in BASE_STEPS)
     base = low + (high - low) * draws.uniform(m)

@@ -99,13 +99,18 @@ class Experiment:
     name: str
     asks: str
     """The question, as a sentence."""
-    grid: Grid
+    grids: tuple[Grid, ...]
     contenders: tuple[Contender, ...]
     yardsticks: Yardsticks | None = None
     share: float = 1.0
     """Of the missions of each scenario that a study wants, those that this experiment has."""
     part: int = 200
     """Missions that are done at once: few where they are dear, as what is interrupted is lost."""
+
+    def scenarios(self) -> Iterator[Scenario]:
+        """All of its scenarios; those of one team follow one another."""
+        for grid in self.grids:
+            yield from grid.scenarios()
 
     def missions(self, wanted: int) -> int:
         """How many missions each scenario has."""
@@ -147,7 +152,7 @@ class Part:
 
 def numbered(experiments: Sequence[Experiment]) -> list[Numbered]:
     """All scenarios, in order."""
-    planned = [(one.name, scenario) for one in experiments for scenario in one.grid.scenarios()]
+    planned = [(one.name, scenario) for one in experiments for scenario in one.scenarios()]
     return [
         Numbered(number=number, experiment=name, draws=Team.of(scenario).draws, scenario=scenario)
         for number, (name, scenario) in enumerate(planned)
