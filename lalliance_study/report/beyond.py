@@ -1,7 +1,4 @@
-"""Beyond the paper: what was measured that it makes no claim of. Everything is told relative to II with the derived ordering.
-
-Who is compared, and how it is called; the numbers are those of `comparisons`.
-"""
+"""Beyond the paper: who is compared with whom, and how that is called. The numbers are those of `comparisons`."""
 
 from collections.abc import Iterator, Sequence
 
@@ -11,7 +8,7 @@ from lalliance_study.report.comparisons import Comparison, compare
 from lalliance_study.report.optima import DERIVED
 from lalliance_study.report.results import Measured
 
-#: Those whom L-ALLIANCE is compared with, and how they are called; the last are planners, with perfect times and instant repair.
+#: Who is compared with the default, and how they are called; the last six are planners, with perfect times and instant repair.
 RIVALS = {
     "I/derived": "strategy I",
     "III/derived": "strategy III",

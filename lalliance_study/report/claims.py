@@ -1,7 +1,7 @@
-"""Claims and how they are judged. Rules are fixed here, before any row is looked at, and the report prints them.
+"""Claims and how they are judged. Rules are fixed here, before any row is looked at, and the page prints them.
 
-A claim is put to every scenario that it speaks of. Each answers with *yes*, *no*, or nothing: intervals are widened (Bonferroni)
-until all answers of a claim hold together with 95 %. All verdicts follow from these answers by one rule, `judge`.
+A claim is put to every scenario that it speaks of. Each answers with *yes*, *no*, or nothing: intervals are widened
+(Bonferroni) until all answers of a claim hold together with 95 %. All verdicts follow from these answers by one rule, `judge`.
 """
 
 from collections import Counter
@@ -103,7 +103,7 @@ def judge(answers: Sequence[Answer], effect: Estimate | None, detail: str = "") 
 
 
 def judge_somewhere(answers: Sequence[Answer], effect: Estimate | None, detail: str = "") -> Finding:
-    """The verdict on a claim that something is so in a region: *reproduced* if at least a twentieth of the scenarios say yes."""
+    """The verdict on a claim of some region: *reproduced* if at least a twentieth of the scenarios say yes."""
     yes = sum(one.yes is True for one in answers)
     verdict = Verdict.REPRODUCED if yes >= SOMEWHERE * len(answers) else Verdict.NOT_REPRODUCED
     told = _counted(answers)

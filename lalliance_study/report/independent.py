@@ -79,30 +79,28 @@ def _orderings(results: Results) -> list[Known]:
 
 def _optima(results: Results) -> list[Known]:
     found = []
-    for hand_over, mean, most in (("shared_max", 1.053, 1.28), ("restart", 1.108, 1.61)):
-        samples = _samples(results.of("optimum", lambda one, rule=hand_over: one.hand_over == rule))
+    for rule, mean, most in (("shared_max", 1.053, 1.28), ("restart", 1.108, 1.61)):
+        samples = _samples([one for one in results.of("optimum") if one.scenario.hand_over == rule])
         farthest = Estimate(float(np.concatenate(samples).max()), np.nan, np.nan) if samples else None
-        found.append(
-            Known(f"mean ratio to the optimum, {hand_over}", mean, statistics.pooled_mean(samples) if samples else None)
-        )
-        found.append(Known(f"largest ratio to the optimum, {hand_over}", most, farthest))
+        found.append(Known(f"mean ratio to the optimum, {rule}", mean, _mean(samples)))
+        found.append(Known(f"largest ratio to the optimum, {rule}", most, farthest))
     return found
 
 
 def _growth(results: Results) -> list[Known]:
     found = []
-    for hand_over, theirs in (("shared_max", 1.31), ("restart", 1.72)):
-        samples = _samples(
-            results.of(
-                "growth",
-                lambda one, rule=hand_over: (
-                    (one.hand_over, one.robots, one.tasks, one.coverage, one.heterogeneity) == (rule, 20, 40, 4, 100)
-                ),
-            )
-        )
-        ours = statistics.pooled_mean(samples) if samples else None
-        found.append(Known(f"mean ratio to the optimum at (20, 40, 4), 100 %, {hand_over}", theirs, ours))
+    for rule, theirs in (("shared_max", 1.31), ("restart", 1.72)):
+        samples = _samples([one for one in results.of("growth", _largest) if one.scenario.hand_over == rule])
+        found.append(Known(f"mean ratio to the optimum at (20, 40, 4), 100 %, {rule}", theirs, _mean(samples)))
     return found
+
+
+def _largest(one: Scenario) -> bool:
+    return (one.robots, one.tasks, one.coverage, one.heterogeneity) == (20, 40, 4, 100)
+
+
+def _mean(samples: Sequence[statistics.Floats]) -> Estimate | None:
+    return statistics.pooled_mean(samples) if samples else None
 
 
 def _samples(found: Sequence[Measured]) -> list[statistics.Floats]:

@@ -59,8 +59,8 @@ CLAIMS = (
         key="longest-first",
         title="Longest first is a disaster",
         where="section 4, last paragraph but one",
-        says="Longest task first is disastrous for heterogeneous teams in which robots may fail: in general each task is tried by "
-        "the robot that is worst at it.",
+        says="Longest task first is disastrous for heterogeneous teams in which robots may fail: in general each task is tried "
+        "by the robot that is worst at it.",
         rule=f"Teams at least mildly heterogeneous ({MILD:g} %) in which robots die, each strategy. Yes: it takes more than "
         f"{DISASTER:g} times as long as shortest first. No: less.",
         effect="longest first / shortest first",
@@ -72,8 +72,8 @@ CLAIMS = (
         key="derived",
         title="The derived ordering is best",
         where="section 5, paragraphs 3 and 4; Appendix",
-        says="What a robot is best at longest first, and the rest shortest first, avoids the trouble of longest first and gains more "
-        "than random selection does.",
+        says="What a robot is best at longest first, and the rest shortest first, avoids the trouble of longest first and "
+        "gains more than random selection does.",
         rule="Strategy II. Yes: derived beats shortest first, random or longest first and none beats it. No: one beats it.",
         effect="II: derived / shortest first",
         experiment="orderings",

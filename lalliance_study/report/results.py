@@ -1,9 +1,10 @@
 """What the study measured, as the report uses it: per scenario the makespans of all contenders on the same missions."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import json
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lalliance_agents.errors import UserError
-from lalliance_study.experiments.manifest import Asked, Manifest
-from lalliance_study.experiments.rows import read
+from lalliance_study.experiments.manifest import FILE, FORMAT, Asked, Manifest
+from lalliance_study.experiments.plan import parts
+from lalliance_study.experiments.presets import preset
+from lalliance_study.experiments.rows import kept, read
 from lalliance_study.report.comparisons import Comparison, compare
 from lalliance_study.report.statistics import Floats
 from lalliance_study.scenarios import Scenario
@@ -59,7 +62,14 @@ class Measured:
 
 
 class Results:
-    """The results of a study in a folder, read an experiment at a time."""
+    """The results of a study in a folder, read an experiment at a time.
+
+    Attributes:
+        folder: where they are.
+        manifest: what the study consists of.
+        parts: of how many parts it consists.
+        missing: how many of them are not there yet.
+    """
 
     def __init__(self, folder: Path) -> None:
         """Look at what is there.
@@ -68,7 +78,17 @@ class Results:
             UserError: it is no study, or one of another version.
         """
         self.folder = folder
+        _check_version(folder / FILE)
         self.manifest = Manifest.read(folder)
+        asked = preset(self.manifest.preset)
+        same = Manifest.of(asked, self.manifest.missions, self.manifest.seed)
+        if (self.manifest.experiments, self.manifest.scenarios) != (same.experiments, same.scenarios):
+            raise UserError(
+                f"{folder / FILE}: other experiments than preset {asked.name} has in this version; "
+                "expected results of this version"
+            )
+        planned = {part.name for part in parts(asked.experiments, self.manifest.missions, self.manifest.seed)}
+        self.parts, self.missing = len(planned), len(planned - kept(folder))
         self._read: dict[str, list[Measured]] = {}
 
     @cached_property
@@ -111,6 +131,22 @@ class Results:
             )
 
 
+def _check_version(path: Path) -> None:
+    """Refuse results of another version, whatever else their manifest says.
+
+    Raises:
+        UserError: they are of another version.
+    """
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return  # what is wrong with it is for `Manifest.read` to say
+    ours = {"format": FORMAT, "lalliance": version("lalliance")}
+    for field, value in ours.items():
+        if isinstance(found, dict) and found.get(field, value) != value:
+            raise UserError(f"{path}: results of {field} {found[field]}; expected {field} {value}")
+
+
 def _by_contender(rows: "pl.DataFrame") -> Iterator[tuple[str, "pl.DataFrame"]]:
     for (name,), own in rows.group_by("contender", maintain_order=True):
         yield str(name), own
@@ -119,9 +155,3 @@ def _by_contender(rows: "pl.DataFrame") -> Iterator[tuple[str, "pl.DataFrame"]]:
 def _floats(rows: "pl.DataFrame", column: str) -> Floats:
     """A column, with what is missing as not a number."""
     return rows[column].fill_null(np.nan).to_numpy().astype(np.float64)
-
-
-def by(found: Sequence[Measured], key: Callable[[Scenario], float | str]) -> dict[float | str, list[Measured]]:
-    """Scenarios in groups, in the order of the groups' keys."""
-    ordered = sorted(found, key=lambda one: (key(one.scenario), one.number))
-    return {value: list(group) for value, group in groupby(ordered, key=lambda one: key(one.scenario))}

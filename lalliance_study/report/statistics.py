@@ -13,7 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+
+from lalliance_study.extras import study_package
+
+stats = study_package("scipy.stats")
 
 Floats = NDArray[np.float64]
 

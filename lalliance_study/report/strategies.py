@@ -1,7 +1,7 @@
 """Claims on the strategies: Figures 2 and 3 of the paper, and what section 5 concludes from them.
 
-The boundaries of Figure 2's regions 1 to 4 stand in its drawing and not in the text. So what the text says of a region is put to
-the whole grid of tasks per robot and coverage, and where it holds is for the map to show.
+The boundaries of Figure 2's regions 1 to 4 stand in its drawing and not in the text. So what the text says of a region is
+put to the whole grid of tasks per robot and coverage, and where it holds is for the map to show.
 """
 
 from collections.abc import Sequence
@@ -102,7 +102,7 @@ def _mild(scenario: Scenario) -> bool:
 
 
 _SHORTEST = "Modified shortest first."
-CLAIMS = (
+FIGURE_2 = (
     Claim(
         key="II-with-PWW",
         title="II is best where work progresses",
@@ -118,7 +118,8 @@ CLAIMS = (
         key="III-without-PWW",
         title="III is preferred somewhere where robots get stuck",
         where="Figure 2; section 5, paragraph 2",
-        says="With PWW false, III is preferred to II in region 3, and in region 2 for mildly heterogeneous teams (300 to 600 %).",
+        says="With PWW false, III is preferred to II in region 3, and in region 2 for mildly heterogeneous teams "
+        "(300 to 600 %).",
         rule=f"{_SHORTEST} Yes: III beats II. No: II beats III. It need not be so everywhere.",
         effect="III / II",
         experiment="strategies",
@@ -158,23 +159,23 @@ CLAIMS = (
         wanted=_any,
         test=partial(best, "random"),
     ),
-    *(
-        Claim(
-            key=f"random-{strategy}",
-            title=f"Random selection {'helps' if better else 'harms'} {strategy}",
-            where="Figure 3; section 4, last paragraph",
-            says=f"Modified random selection in the place of modified shortest first {effect}, whatever the region.",
-            rule=f"Teams at least mildly heterogeneous ({MILD:g} %). Yes: {strategy} is {way} with random selection. "
-            "No: the reverse.",
-            effect=f"{strategy}: random / shortest first",
-            experiment="strategies",
-            wanted=_mild,
-            test=partial(changed, strategy, better),
-        )
-        for strategy, better, effect, way in (
-            ("I", False, "makes teams under strategy I slower as heterogeneity grows", "slower"),
-            ("III", False, "makes teams under strategy III slower as heterogeneity grows", "slower"),
-            ("II", True, "makes teams under strategy II quicker", "quicker"),
-        )
-    ),
+)
+FIGURE_3 = tuple(
+    Claim(
+        key=f"random-{strategy}",
+        title=f"Random selection {'helps' if better else 'harms'} {strategy}",
+        where="Figure 3; section 4, last paragraph",
+        says=f"Modified random selection in the place of modified shortest first {effect}, whatever the region.",
+        rule=f"Teams at least mildly heterogeneous ({MILD:g} %). Yes: {strategy} is {way} with random selection. "
+        "No: the reverse.",
+        effect=f"{strategy}: random / shortest first",
+        experiment="strategies",
+        wanted=_mild,
+        test=partial(changed, strategy, better),
+    )
+    for strategy, better, effect, way in (
+        ("I", False, "makes teams under strategy I slower as heterogeneity grows", "slower"),
+        ("III", False, "makes teams under strategy III slower as heterogeneity grows", "slower"),
+        ("II", True, "makes teams under strategy II quicker", "quicker"),
+    )
 )

@@ -1,6 +1,7 @@
 """Beyond the paper: rivals, what knowledge is worth, what literal readings cost, and how much parameters matter."""
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,7 +89,7 @@ def _dotted(
     """Panels of ratios as dots with their intervals: a row for each name, heterogeneity down, hand-over across."""
     levels = sorted({one.scenario.heterogeneity for one in found})
     figure = Figure(figsize=(10.4, 0.9 + len(levels) * (0.5 + 0.23 * len(rows))))
-    panels = figure.subplots(len(levels), len(HAND_OVERS), sharex=True, sharey=True, squeeze=False)
+    panels: Panels = figure.subplots(len(levels), len(HAND_OVERS), sharex=True, sharey=True, squeeze=False).tolist()
     marked: dict[str, None] = {}
     for row, level in zip(panels, levels, strict=True):
         for axes, rule in zip(row, HAND_OVERS, strict=True):
@@ -125,7 +126,7 @@ def _dot(axes: "Axes", place: float, comparisons: Sequence[Comparison], colour: 
 
 
 def _dotted_axes(figure: Figure, panels: Panels, rows: Sequence[str], says: str) -> None:
-    for axes in panels.flat:
+    for axes in chain(*panels):
         axes.axvline(1.0, color="black", linewidth=0.9, zorder=1)
         axes.set_xscale("log")
         low, high = axes.get_xlim()

@@ -1,7 +1,8 @@
 """What several figures have in common: axes of heterogeneity, and lines in bands."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from itertools import chain
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,7 +15,8 @@ from lalliance_study.report.statistics import Estimate
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Panels = np.ndarray[tuple[int, int], np.dtype[np.object_]]
+Panels: TypeAlias = "list[list[Axes]]"
+"""The panels of a figure, by row and column."""
 
 HAND_OVERS = {
     "shared_max": "shared_max\nwork left belongs to the task",
@@ -62,7 +64,7 @@ def change(ratio: float) -> str:
     return f"×{ratio:.3g}" if ratio >= 2 else f"{ratio - 1:+.0%}".replace("+0%", "0%")
 
 
-def band(axes: "Axes", places: Sequence[float], estimates: Sequence[Estimate], colour: str, **line: object) -> None:
+def band(axes: "Axes", places: Sequence[float], estimates: Sequence[Estimate], colour: str, **line: Any) -> None:
     """A line through values, in a band that is their interval."""
     values = np.array(estimates)
     axes.fill_between(places, values[:, 1], values[:, 2], color=colour, alpha=0.18, linewidth=0)
@@ -74,7 +76,7 @@ def ratio_line(
     comparisons: Sequence[Comparison],
     place: Callable[[Comparison], float],
     colour: str,
-    **line: object,
+    **line: Any,
 ) -> None:
     """Pooled ratios against something; where missions cannot be compared by time the line has a gap."""
     places = sorted({place(one) for one in comparisons})
@@ -88,9 +90,9 @@ def place(one: Comparison) -> float:
     return doubled(one.scenario.heterogeneity)
 
 
-def ratios_against_heterogeneity(panels: "Panels", levels: Sequence[float]) -> None:
+def ratios_against_heterogeneity(panels: Panels, levels: Sequence[float]) -> None:
     """Axes of panels of ratios against heterogeneity, a column for each hand-over."""
-    for axes in panels.flat:
+    for axes in chain(*panels):
         axes.axhline(1.0, color="black", linewidth=0.9, zorder=1)
         change_axis(axes)
         heterogeneity_axis(axes, levels)
@@ -100,7 +102,9 @@ def ratios_against_heterogeneity(panels: "Panels", levels: Sequence[float]) -> N
         axes.set_xlabel("heterogeneity, in percent")
 
 
-def grid(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, "Panels"]:
-    """A figure of panels that share their axes, `[rows, columns]`."""
+def grid(
+    rows: int, columns: int, size: tuple[float, float], sharey: Literal["all", "row"] = "all"
+) -> tuple[Figure, Panels]:
+    """A figure of panels that share their axes, those of values perhaps by row alone."""
     figure = Figure(figsize=size)
-    return figure, figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    return figure, figure.subplots(rows, columns, sharex=True, sharey=sharey, squeeze=False).tolist()

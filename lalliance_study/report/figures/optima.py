@@ -1,7 +1,7 @@
 """How far from the optimum: the distribution, where in the grid, and how that grows with the size of the problem."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -26,7 +26,7 @@ LINES = {
 }
 #: shared_add is drawn broad and below shared_max, from which it hardly differs.
 RULES = {"shared_add": (SKY, 3.6), "shared_max": (BLUE, 1.5), "restart": (VERMILION, 1.5)}
-ORDERINGS = {"II/derived": "-", "II/shortest_first": "--"}
+ORDERINGS: dict[str, Literal["-", "--"]] = {"II/derived": "-", "II/shortest_first": "--"}
 
 
 def distribution(found: Sequence[Measured]) -> Figure:

@@ -1,6 +1,7 @@
 """What the orderings change: longest first for each way in which times may be spread, and all of them for strategy II."""
 
 from collections.abc import Sequence
+from typing import Literal
 
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -17,6 +18,8 @@ from lalliance_study.report.results import Measured
 
 SPREADS = {"unrelated": BLUE, "log_uniform": SKY, "related": ORANGE}
 ORDERINGS = {"derived": BLUE, "random": PINK, "longest_first": BLACK}
+#: How lines are drawn where robots die, and where not.
+DASHES: dict[Literal["-", ":"], str] = {"-": "robots die", ":": "nobody dies"}
 BEFALLS = {"nothing befalls": (False, False), "robots die": (True, False), "robots get stuck": (False, True)}
 
 
@@ -28,7 +31,7 @@ def longest_first(found: Sequence[Measured]) -> Figure:
     for row, strategy in zip(panels, strategies, strict=True):
         for axes, rule in zip(row, HAND_OVERS, strict=True):
             for spread, colour in SPREADS.items():
-                for dying, dashes in ((True, "-"), (False, ":")):
+                for dashes, dying in (("-", True), (":", False)):
                     own = [
                         one.compare(f"{strategy}/longest_first", f"{strategy}/shortest_first")
                         for one in found
@@ -42,10 +45,7 @@ def longest_first(found: Sequence[Measured]) -> Figure:
     marks = [
         Line2D([], [], color=colour, label=f"{spread.replace('_', '-')} times") for spread, colour in SPREADS.items()
     ]
-    marks += [
-        Line2D([], [], color=GREY, linestyle=dash, label=told)
-        for dash, told in (("-", "robots die"), (":", "nobody dies"))
-    ]
+    marks += [Line2D([], [], color=GREY, linestyle=dash, label=told) for dash, told in DASHES.items()]
     panels[0][0].legend(handles=marks, loc="upper left")
     return figure
 

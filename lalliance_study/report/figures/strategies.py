@@ -1,16 +1,18 @@
 """Figure 2 as a map of who wins by how much, how that grows with heterogeneity, and Figure 3."""
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
 from lalliance_study.drawing import GREY
-from lalliance_study.report.comparisons import Comparison, Outcome
+from lalliance_study.report.comparisons import Outcome
 from lalliance_study.report.figures.lines import (
     HAND_OVERS,
     STRATEGIES,
@@ -45,7 +47,8 @@ class Best(NamedTuple):
 
 def best_of(one: Measured, names: Mapping[str, str]) -> Best:
     """Who is best among contenders, given by what they are to be called."""
-    beaten, margins = set(), {name: [] for name in names}
+    beaten: set[str] = set()
+    margins: dict[str, list[float]] = {name: [] for name in names}
     for ours in names:
         for other in names:
             compared = one.compare(names[ours], names[other]) if ours != other else None
@@ -81,7 +84,7 @@ def strategy_map(found: Sequence[Measured], ordering: str = "shortest_first") ->
         cell = (column + 0.5 * (where.robots > teams[0][0]), coverages.index(where.coverage))
         _cell(panels[row][levels.index(where.heterogeneity)], cell, best_of(one, names))
     gap = 0.5 * (teams[-1][0] > teams[0][0])
-    for axes in panels.flat:
+    for axes in chain(*panels):
         axes.set(xlim=(-0.1, len(teams) + gap + 0.1), ylim=(-0.1, len(coverages) + 0.1))
         axes.grid(visible=False)
         axes.tick_params(length=0, labelsize=8)
@@ -113,16 +116,16 @@ def _cell(axes: "Axes", corner: tuple[float, float], best: Best) -> None:
 def _frame(panels: Panels, rows: Sequence[tuple[str, bool]], levels: Sequence[float]) -> None:
     for axes, level in zip(panels[0], levels, strict=True):
         axes.set_title(f"heterogeneity {level:g} %" if axes is panels[0][0] else f"{level:g} %", loc="center")
-    for axes, (rule, pww) in zip(panels[:, 0], rows, strict=True):
+    for (axes, *_), (rule, pww) in zip(panels, rows, strict=True):
         axes.set_ylabel(f"{rule}\n{'work progresses' if pww else 'robots get stuck'}\n\ncoverage")
     for axes in panels[-1]:
         axes.set_xlabel("tasks per robot")
-    for axes, (_, pww) in zip(panels[:, -1], rows, strict=True):
+    for (*_, axes), (_, pww) in zip(panels, rows, strict=True):
         axes.text(1.04, 0.5, PAPER[pww], transform=axes.transAxes, va="center", fontsize=8.5, color=GREY)
 
 
 def _key(figure: Figure, teams: Sequence[int]) -> None:
-    patches = [
+    patches: list[Artist] = [
         Patch(facecolor=tint(colour, share), label=f"{strategy} by {told}")
         for strategy, colour in STRATEGIES.items()
         for _, share, told in STEPS
