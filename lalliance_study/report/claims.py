@@ -29,7 +29,7 @@ class Verdict(StrEnum):
     NOT_REPRODUCED = "not reproduced"
     DEPENDS = "depends on"
     ANSWERED = "answered"
-    TOO_FEW = "too few missions"
+    TOO_FEW = "too little data"
     NOT_RUN = "not in these results"
 
 
@@ -63,7 +63,7 @@ class Claim:
     rule: str
     """How it is tested, and when a scenario says yes or no."""
     effect: str
-    """What the effect is, as a ratio."""
+    """What the effect is."""
     experiment: str
     wanted: Callable[[Scenario], bool]
     """The scenarios that it speaks of."""
@@ -74,7 +74,7 @@ class Claim:
         if not found:
             return Finding(Verdict.NOT_RUN)
         if (fewest := min(one.missions for one in found)) < FEWEST:
-            return Finding(Verdict.TOO_FEW, detail=f"{fewest} a scenario; a verdict needs {FEWEST}.")
+            return Finding(Verdict.TOO_FEW, detail=f"{fewest} missions a scenario; a verdict needs {FEWEST}.")
         return self.test(found)
 
 

@@ -54,6 +54,13 @@ class Comparison(NamedTuple):
         """Whether enough missions were finished by both to compare scenarios by time: half of them, and two."""
         return self.ratio is not None and self.both >= max(2, self.missions / 2)
 
+    def not_better(self, confidence: float = CONFIDENCE) -> bool:
+        """Whether the first is surely not better than the second by more than the margin."""
+        if self.outcome(confidence) is Outcome.WORSE:
+            return True
+        evenly = statistics.discordance(self.only_first, self.only_second) >= 1 - confidence
+        return evenly and self.ratio is not None and self.ratio.ratio(confidence).low > 1 - MARGIN
+
     def outcome(self, confidence: float = CONFIDENCE) -> Outcome:
         """Who is better: by finishing if that is uneven, else by time, if the interval lies beyond the margin."""
         if statistics.discordance(self.only_first, self.only_second) < 1 - confidence:

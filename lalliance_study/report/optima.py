@@ -68,7 +68,7 @@ def grows(found: Sequence[Measured]) -> Finding:
             f"{spelled(Estimate(*map(float, np.exp(slope))))}."
         )
     if not told:
-        return Finding(Verdict.TOO_FEW, detail="growth needs three sizes.")
+        return Finding(Verdict.TOO_FEW, detail="Growth needs three sizes.")
     return Finding(Verdict.ANSWERED, effect=effects[0], detail=" ".join(told))
 
 

@@ -46,6 +46,25 @@ def derived(found: Sequence[Measured]) -> Finding:
     return judge(answers_of(found, ours, rivals), ratio_of(compared[rivals[0]]), told_all)
 
 
+def derived_instead(found: Sequence[Measured]) -> Finding:
+    """The derived ordering beats shortest first."""
+    ours, rival = "II/derived", "II/shortest_first"
+    compared = [one.compare(ours, rival) for one in found]
+    ratio = ratio_of(compared)
+    told = " ".join(filter(None, [said(ours, rival, ratio), *_by_hearing(compared), unfinished(compared, ours, rival)]))
+    return judge(answers_of(found, ours, [rival]), ratio, told)
+
+
+def _by_hearing(compared: Sequence[Comparison]) -> list[str]:
+    """The ratio where all robots hear of all work, and where not."""
+    told = []
+    for everybody, where in ((True, "every robot can do every task"), (False, "some tasks are not for all robots")):
+        own = [one for one in compared if (one.scenario.coverage >= one.scenario.robots) == everybody]
+        if (ratio := ratio_of(own)) is not None:
+            told.append(f"Where {where}: {ratio.value:.3f} ({ratio.low:.3f} to {ratio.high:.3f}).")
+    return told
+
+
 def _dying(scenario: Scenario) -> bool:
     return scenario.failures > 0 and scenario.heterogeneity >= MILD
 
@@ -54,7 +73,7 @@ def _any(_: Scenario) -> bool:
     return True
 
 
-CLAIMS = (
+ORDERINGS = (
     Claim(
         key="longest-first",
         title="Longest first is a disaster",
@@ -79,5 +98,18 @@ CLAIMS = (
         experiment="orderings",
         wanted=_any,
         test=derived,
+    ),
+)
+SMALL_TEAMS = (
+    Claim(
+        key="derived-in-small-teams",
+        title="The derived ordering is better than shortest first, small teams",
+        where="section 5, paragraphs 3 to 5",
+        says="As above; the comparison with the optimum is made with the derived ordering.",
+        rule="Strategy II, teams of up to six. Yes: derived beats shortest first. No: the reverse.",
+        effect="II: derived / shortest first",
+        experiment="optimum",
+        wanted=_any,
+        test=derived_instead,
     ),
 )

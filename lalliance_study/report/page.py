@@ -37,12 +37,16 @@ def page(results: Results, found: Findings) -> str:
         verdicts=_verdicts(found),
         independent=_independent(results),
         measured=_measured(results),
-        confidence=f"{CONFIDENCE:.0%}",
-        margin=f"{MARGIN:.0%}",
-        refuted=f"{REFUTED:.0%}",
-        somewhere=f"{SOMEWHERE:.0%}",
+        confidence=_percent(CONFIDENCE),
+        margin=_percent(MARGIN),
+        refuted=_percent(REFUTED),
+        somewhere=_percent(SOMEWHERE),
         fewest=FEWEST,
     )
+
+
+def _percent(share: float) -> str:
+    return f"{share:.0%}".replace("%", " %")
 
 
 def _command(results: Results) -> str:
@@ -70,11 +74,12 @@ def _verdicts(found: Findings) -> str:
         [
             f"[{claim.title}](#{claim.key.lower()})",
             claim.where,
+            claim.effect,
             *(_short(found[claim.key][rule]) for rule in HAND_OVERS),
         ]
         for claim in CLAIMS
     ]
-    return table(["claim", "in the paper", *HAND_OVERS], body)
+    return table(["claim", "in the paper", "effect", *HAND_OVERS], body)
 
 
 def _short(finding: Finding) -> str:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +19,10 @@ from lalliance_study.report.comparisons import Comparison, compare
 from lalliance_study.report.statistics import Floats
 from lalliance_study.scenarios import Scenario
 
-if TYPE_CHECKING:
-    import polars as pl
-
 #: With fewer missions a scenario no verdict is given.
 FEWEST = 20
+#: Columns of times that are read, in seconds.
+FLOATS = ("makespan", "optimum", "bound", "shared_optimum")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,26 +106,37 @@ class Results:
 
     def _measured(self, experiment: str) -> Iterator[Measured]:
         rows = read(self.folder, [experiment])
+        numbers = rows["scenario"].to_numpy()
+        columns = {name: rows[name].fill_null(np.nan).to_numpy() for name in FLOATS}
+        who, missions = rows["contender"].to_numpy(), rows["mission"].to_numpy()
+        proven = rows["proven"].fill_null(value=False).to_numpy().astype(np.bool_)
+        names = sorted(one.name for one in self.asked[experiment].contenders)
         planned = {one.number: one for one in self.manifest.scenarios}
-        for (number,), own in rows.group_by("scenario", maintain_order=True):
-            one = planned[int(str(number))]
-            by_contender = dict(_by_contender(own))
-            missions = {tuple(part["mission"]) for part in by_contender.values()}
-            if len(missions) != 1 or len(by_contender) != len(self.asked[experiment].contenders):
+        for block in np.split(np.arange(len(numbers)), np.flatnonzero(np.diff(numbers)) + 1):
+            if not len(block):
+                continue
+            one = planned[int(numbers[block[0]])]
+            count = len(block) // len(names)
+            first = block[:count]
+            if len(block) != count * len(names) or not (
+                (who[block] == np.repeat(names, count)).all()
+                and (missions[block].reshape(len(names), count) == missions[first]).all()
+            ):
                 raise UserError(
-                    f"{self.folder}: scenario {number} of {experiment} has not the same missions for all contenders; "
+                    f"{self.folder}: scenario {one.number} of {experiment} has not the same missions for all contenders; "
                     "expected what lalliance study run wrote"
                 )
-            first = next(iter(by_contender.values()))
+            times = columns["makespan"][block].reshape(len(names), count)
+            optimum, bound, shared = (columns[name][first] for name in FLOATS[1:])
             yield Measured(
                 number=one.number,
                 draws=one.draws,
                 scenario=one.scenario,
-                times={name: _floats(part, "makespan") for name, part in by_contender.items()},
-                optimum=_floats(first, "optimum"),
-                bound=_floats(first, "bound"),
-                proven=first["proven"].fill_null(value=False).to_numpy().astype(np.bool_),
-                shared=_floats(first, "shared_optimum"),
+                times=dict(zip(names, times, strict=True)),
+                optimum=optimum,
+                bound=bound,
+                proven=proven[first],
+                shared=shared,
             )
 
 
@@ -145,13 +154,3 @@ def _check_version(path: Path) -> None:
     for field, value in ours.items():
         if isinstance(found, dict) and found.get(field, value) != value:
             raise UserError(f"{path}: results of {field} {found[field]}; expected {field} {value}")
-
-
-def _by_contender(rows: "pl.DataFrame") -> Iterator[tuple[str, "pl.DataFrame"]]:
-    for (name,), own in rows.group_by("contender", maintain_order=True):
-        yield str(name), own
-
-
-def _floats(rows: "pl.DataFrame", column: str) -> Floats:
-    """A column, with what is missing as not a number."""
-    return rows[column].fill_null(np.nan).to_numpy().astype(np.float64)

@@ -85,7 +85,7 @@ SECTIONS = (
                 ordering_figures.orderings,
             ),
         ),
-        claims=orderings.CLAIMS,
+        claims=orderings.ORDERINGS,
     ),
     Section(
         "optimum",
@@ -103,7 +103,7 @@ SECTIONS = (
                 optimum_figures.by_region,
             ),
         ),
-        claims=optima.NEAR_THE_OPTIMUM,
+        claims=(*optima.NEAR_THE_OPTIMUM, *orderings.SMALL_TEAMS),
         table=tables.distances,
     ),
     Section(

@@ -59,9 +59,9 @@ def never(found: Sequence[Measured]) -> Finding:
     sure = strict([each for row in compared for each in row])
     answers = []
     for against_two, against_three in zip(*compared, strict=True):
-        outcomes = {against_two.outcome(sure), against_three.outcome(sure)}
-        superior = outcomes == {Outcome.BETTER}
-        answers.append(Answer(against_two.scenario, False if superior else Outcome.WORSE in outcomes or None))
+        superior = against_two.outcome(sure) is against_three.outcome(sure) is Outcome.BETTER
+        equalled = against_two.not_better(sure) or against_three.not_better(sure)
+        answers.append(Answer(against_two.scenario, False if superior else equalled or None))
     return judge(answers, ratio_of(compared[0]), told)
 
 
@@ -142,7 +142,7 @@ FIGURE_2 = (
         title="I is never superior",
         where="Figure 2; section 5, paragraph 2",
         says="Strategy I is nowhere superior to both of the others.",
-        rule=f"{_SHORTEST} Yes: II or III beats I. No: I beats both.",
+        rule=f"{_SHORTEST} Yes: I is not better than II, or not better than III. No: I beats both.",
         effect="I / II",
         experiment="strategies",
         wanted=_any,

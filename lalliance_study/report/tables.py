@@ -81,11 +81,12 @@ def _cell(comparisons: Sequence[Comparison]) -> str:
     """A pooled ratio, and the share of missions left unfinished where that differs."""
     if not comparisons:
         return "–"
-    told = number(ratio_of(comparisons), 2)
-    if all(one.only_first == one.only_second for one in comparisons):
-        return told
+    ratio = ratio_of(comparisons)
     left = sum(one.only_second + one.neither for one in comparisons) / sum(one.missions for one in comparisons)
-    return f"{told}, {left:.1%} unfinished"
+    if ratio is None:
+        return f"{left:.1%} unfinished"
+    same = all(one.only_first == one.only_second for one in comparisons)
+    return number(ratio, 2) if same else f"{number(ratio, 2)}, {left:.1%} unfinished"
 
 
 def distances(found: Sequence[Measured]) -> str:
