@@ -10,6 +10,7 @@ from lalliance_study.report.results import Measured
 
 #: Who is compared with the default, and how they are called; the last six are planners, with perfect times and instant repair.
 RIVALS = {
+    "II/shortest_first": "II, shortest first",
     "I/derived": "strategy I",
     "III/derived": "strategy III",
     "alliance": "ALLIANCE, set by hand",

@@ -102,7 +102,7 @@ def _dotted(
                     shift = 0.7 * ((number + 0.5) / len(groups) - 0.5)
                     _dot(axes, place + shift, made[name].get(group, ()), COLOURS[group])
         row[0].set_ylabel(f"heterogeneity {level:g} %")
-    _dotted_axes(figure, panels, rows, says)
+    _dotted_axes(panels, rows, says)
     marks = [Line2D([], [], linestyle="none", marker="o", color=COLOURS[group], label=group) for group in marked]
     marks.append(Line2D([], [], linestyle="none", marker="x", color=GREY, label="leaves more than 1 % more unfinished"))
     figure.legend(handles=marks, loc="outside lower center", ncols=4)
@@ -119,13 +119,11 @@ def _dot(axes: "Axes", place: float, comparisons: Sequence[Comparison], colour: 
         axes.plot([low, high], [place, place], color=colour, linewidth=1.2)
         axes.plot(value, place, marker="x" if more > 0.01 else "o", color=colour, markersize=4.5)
     if more > 0.01:
-        at = 1.0 if ratio is None else ratio.ratio().high
-        axes.annotate(
-            f"{more:.0%}", (at, place), xytext=(4, -2.5), textcoords="offset points", color=colour, fontsize=6.5
-        )
+        at, told = (1.0, f"{more:.0%} unfinished") if ratio is None else (ratio.ratio().high, f"{more:.0%}")
+        axes.annotate(told, (at, place), xytext=(4, -2.5), textcoords="offset points", color=colour, fontsize=6.5)
 
 
-def _dotted_axes(figure: Figure, panels: Panels, rows: Sequence[str], says: str) -> None:
+def _dotted_axes(panels: Panels, rows: Sequence[str], says: str) -> None:
     for axes in chain(*panels):
         axes.axvline(1.0, color="black", linewidth=0.9, zorder=1)
         axes.set_xscale("log")
@@ -139,7 +137,8 @@ def _dotted_axes(figure: Figure, panels: Panels, rows: Sequence[str], says: str)
         axes.tick_params(axis="x", labelrotation=45)
     for axes, told in zip(panels[0], HAND_OVERS.values(), strict=True):
         axes.set_title(told)
-    figure.supxlabel(says, fontsize=9.5)
+    for axes in panels[-1]:
+        axes.set_xlabel(says)
 
 
 def sensitivity(found: Sequence[Measured]) -> Figure:
