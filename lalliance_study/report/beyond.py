@@ -57,6 +57,14 @@ def against_exact(found: Sequence[Measured], contender: str) -> Iterator[Compari
             yield compare(one.number, one.draws, one.scenario, one.times[contender], theirs)
 
 
+def by_circumstances(comparisons: Sequence[Comparison]) -> dict[str, list[Comparison]]:
+    """Comparisons in groups, by what befalls the team or what it knows."""
+    groups: dict[str, list[Comparison]] = {}
+    for one in comparisons:
+        groups.setdefault(circumstances(one.scenario), []).append(one)
+    return groups
+
+
 def readings(contenders: Sequence[str]) -> dict[str, str]:
     """Contenders that read an erratum otherwise, and how they are called."""
     errata = {str(number): erratum for number, erratum in enumerate(Erratum, 1)}

@@ -85,6 +85,11 @@ class Answer(NamedTuple):
     yes: bool | None
 
 
+def anything(_: Scenario) -> bool:
+    """All scenarios."""
+    return True
+
+
 def judge(answers: Sequence[Answer], effect: Estimate | None, detail: str = "") -> Finding:
     """The verdict on a claim that speaks of every scenario.
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lalliance_study.report import statistics
-from lalliance_study.report.claims import Answer, Claim, Finding, Verdict, judge
+from lalliance_study.report.claims import Answer, Claim, Finding, Verdict, anything, judge
 from lalliance_study.report.results import Measured
 from lalliance_study.report.statistics import Estimate, LogRatio
 from lalliance_study.scenarios import Scenario
@@ -91,10 +91,6 @@ def _unproven(one: Measured) -> str:
     return f" (of {one.missions} optima {unproven} are not proven: the ratio to the optimum is {most:.3f} at most)"
 
 
-def _any(_: Scenario) -> bool:
-    return True
-
-
 NEAR_THE_OPTIMUM = (
     Claim(
         key="near-the-optimum",
@@ -106,7 +102,7 @@ NEAR_THE_OPTIMUM = (
         f"{NEAR:.2f} at most. No: it is more.",
         effect="mean of makespan / optimum",
         experiment="optimum",
-        wanted=_any,
+        wanted=anything,
         test=near,
     ),
 )
@@ -120,7 +116,7 @@ GROWTH = (
         "number of tasks. Where an optimum is not proven, the best schedule known is in its place.",
         effect="ratio at the largest size",
         experiment="growth",
-        wanted=_any,
+        wanted=anything,
         test=grows,
     ),
 )

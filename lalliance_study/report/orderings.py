@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from lalliance_study.report.claims import Answer, Claim, Finding, judge, ratio_of, said, unfinished
+from lalliance_study.report.claims import Answer, Claim, Finding, anything, judge, ratio_of, said, unfinished
 from lalliance_study.report.comparisons import Comparison, strict
 from lalliance_study.report.results import Measured
 from lalliance_study.report.strategies import MILD, answers_of
@@ -69,10 +69,6 @@ def _dying(scenario: Scenario) -> bool:
     return scenario.failures > 0 and scenario.heterogeneity >= MILD
 
 
-def _any(_: Scenario) -> bool:
-    return True
-
-
 ORDERINGS = (
     Claim(
         key="longest-first",
@@ -96,7 +92,7 @@ ORDERINGS = (
         rule="Strategy II. Yes: derived beats shortest first, random or longest first and none beats it. No: one beats it.",
         effect="II: derived / shortest first",
         experiment="orderings",
-        wanted=_any,
+        wanted=anything,
         test=derived,
     ),
 )
@@ -109,7 +105,7 @@ SMALL_TEAMS = (
         rule="Strategy II, teams of up to six. Yes: derived beats shortest first. No: the reverse.",
         effect="II: derived / shortest first",
         experiment="optimum",
-        wanted=_any,
+        wanted=anything,
         test=derived_instead,
     ),
 )

@@ -9,7 +9,17 @@ from functools import partial
 
 import numpy as np
 
-from lalliance_study.report.claims import Answer, Claim, Finding, judge, judge_somewhere, ratio_of, said, unfinished
+from lalliance_study.report.claims import (
+    Answer,
+    Claim,
+    Finding,
+    anything,
+    judge,
+    judge_somewhere,
+    ratio_of,
+    said,
+    unfinished,
+)
 from lalliance_study.report.comparisons import Comparison, Outcome, pooled, strict
 from lalliance_study.report.results import Measured
 from lalliance_study.report.statistics import trend
@@ -93,10 +103,6 @@ def _stuck(scenario: Scenario) -> bool:
     return scenario.traps > 0
 
 
-def _any(_: Scenario) -> bool:
-    return True
-
-
 def _mild(scenario: Scenario) -> bool:
     return scenario.heterogeneity >= MILD
 
@@ -145,7 +151,7 @@ FIGURE_2 = (
         rule=f"{_SHORTEST} Yes: I is not better than II, or not better than III. No: I beats both.",
         effect="I / II",
         experiment="strategies",
-        wanted=_any,
+        wanted=anything,
         test=never,
     ),
     Claim(
@@ -156,7 +162,7 @@ FIGURE_2 = (
         rule="Modified random. Yes: II beats I or III and neither beats it. No: one of them beats it.",
         effect="III / II",
         experiment="strategies",
-        wanted=_any,
+        wanted=anything,
         test=partial(best, "random"),
     ),
 )

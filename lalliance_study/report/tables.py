@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from lalliance_study.experiments.plan import HAND_OVERS
 from lalliance_study.report import statistics
 from lalliance_study.report.beyond import (
     LEARNERS,
@@ -11,16 +12,15 @@ from lalliance_study.report.beyond import (
     RIVALS,
     against_default,
     against_exact,
+    by_circumstances,
     readings,
     values_of,
 )
-from lalliance_study.report.claims import circumstances, ratio_of
+from lalliance_study.report.claims import ratio_of
 from lalliance_study.report.comparisons import Comparison
 from lalliance_study.report.markdown import number, table
 from lalliance_study.report.optima import DERIVED, NEAR, log_mean, proven, size
 from lalliance_study.report.results import Measured
-
-HAND_OVERS = ("shared_max", "shared_add", "restart")
 
 
 def rivals(found: Sequence[Measured]) -> str:
@@ -62,19 +62,12 @@ def _by_rule(
     tables = []
     for rule in HAND_OVERS:
         own = [one for one in found if one.scenario.hand_over == rule]
-        cells = {told: _by_circumstances(compared(own, name)) for told, name in rows.items()}
+        cells = {told: by_circumstances(compared(own, name)) for told, name in rows.items()}
         columns = list(dict.fromkeys(column for line in cells.values() for column in line))
         body = [[told, *(_cell(line.get(column, [])) for column in columns)] for told, line in cells.items()]
         if own:
             tables.append(table([f"{rule}: {says}", *columns], body, right=True))
     return "\n".join(tables)
-
-
-def _by_circumstances(comparisons: Sequence[Comparison]) -> dict[str, list[Comparison]]:
-    groups: dict[str, list[Comparison]] = {}
-    for one in comparisons:
-        groups.setdefault(circumstances(one.scenario), []).append(one)
-    return groups
 
 
 def _cell(comparisons: Sequence[Comparison]) -> str:

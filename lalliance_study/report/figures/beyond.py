@@ -16,6 +16,7 @@ from lalliance_study.report.beyond import (
     RIVALS,
     against_default,
     against_exact,
+    by_circumstances,
     readings,
     values_of,
 )
@@ -47,7 +48,7 @@ def rivals(found: Sequence[Measured]) -> Figure:
     names = {name: told for name, told in RIVALS.items() if name in found[0].times}
 
     def dots(own: Sequence[Measured]) -> Dots:
-        return {told: _by_circumstances(against_default(own, name)) for name, told in names.items()}
+        return {told: by_circumstances(against_default(own, name)) for name, told in names.items()}
 
     return _dotted(found, list(names.values()), dots, "time, relative to II derived")
 
@@ -71,16 +72,9 @@ def ablation(found: Sequence[Measured]) -> Figure:
     names = readings(list(found[0].times))
 
     def dots(own: Sequence[Measured]) -> Dots:
-        return {told: _by_circumstances(against_default(own, name)) for name, told in names.items()}
+        return {told: by_circumstances(against_default(own, name)) for name, told in names.items()}
 
     return _dotted(found, list(names.values()), dots, "time, relative to the default reading")
-
-
-def _by_circumstances(comparisons: Sequence[Comparison]) -> dict[str, list[Comparison]]:
-    groups: dict[str, list[Comparison]] = {}
-    for one in comparisons:
-        groups.setdefault(circumstances(one.scenario), []).append(one)
-    return groups
 
 
 def _dotted(
