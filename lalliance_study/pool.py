@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 from rich.console import Console
@@ -44,11 +45,13 @@ def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(os.getpid(),))
     waiting: set[Future[T]] = set()
+    through = False
     try:
         while True:
             while len(waiting) < AHEAD * jobs and (part := next(parts, None)) is not None:
                 waiting.add(_submit(pool, work, part))
             if not waiting:
+                through = True
                 return
             done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for one in done:
@@ -57,23 +60,35 @@ def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs
         raise LallianceError("a process that did a part of the work was killed; is memory short?") from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-        if waiting:
+        if not through:
             # Told to end early: nobody will ask for what they are at.
             for child in multiprocessing.active_children():
                 child.terminate()
 
 
+#: What ends this process, which is put off while another one is born.
+_ENDS = (signal.SIGINT, signal.SIGTERM)
+
+
 def _submit(pool: ProcessPoolExecutor, work: Callable[..., T], part: tuple[Any, ...]) -> Future[T]:
-    """Hand over a part; a process that this starts is born deaf to Ctrl-C."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Hand over a part; a process that this starts is born deaf, as it inherits what is blocked here."""
+    came: list[int] = []
+    before = {number: signal.signal(number, lambda told, _: came.append(told)) for number in _ENDS}
     try:
+        resource_tracker.ensure_running()  # which would unblock them if it were started along with the first process
+        signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS)
         return pool.submit(work, *part)
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDS)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in came:
+            signal.raise_signal(number)
 
 
 def _begin(parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDS)
     end_with_parent(parent)
 
 

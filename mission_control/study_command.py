@@ -75,11 +75,11 @@ def run(
     from lalliance_study.experiments.presets import preset as preset_of
     from lalliance_study.experiments.runner import open_study
 
-    wanted = preset_of(preset)
-    hand_out = _hand_out(scheduler, jobs)
-    found = open_study(out, wanted, missions=missions, seed=seed, only=only or ())
     with _told_to_end() as told:
         try:
+            wanted = preset_of(preset)
+            hand_out = _hand_out(scheduler, jobs)
+            found = open_study(out, wanted, missions=missions, seed=seed, only=only or ())
             _carry_out(found, hand_out)
         except KeyboardInterrupt:
             number = told[0] if told else signal.SIGINT

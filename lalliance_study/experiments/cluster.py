@@ -37,8 +37,8 @@ def at_workers_of(address: str) -> Callable[[Callable[..., T], Iterable[tuple[An
 
     def hand_out(work: Callable[..., T], parts: Iterable[tuple[Any, ...]]) -> Generator[T, None, None]:
         try:
-            with joblib.parallel_config(backend="dask", client=client, batch_size=1):
-                at_work = joblib.Parallel(return_as="generator_unordered", pre_dispatch=f"{AHEAD}*n_jobs")
+            with joblib.parallel_config(backend="dask", client=client):
+                at_work = joblib.Parallel(return_as="generator_unordered", batch_size=1, pre_dispatch=f"{AHEAD}*n_jobs")
                 yield from at_work(joblib.delayed(work)(*part) for part in parts)
         except (OSError, distributed.CancelledError, distributed.KilledWorker) as error:
             raise LallianceError(f"the scheduler at {address} is lost ({error})") from None

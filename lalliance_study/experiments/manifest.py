@@ -1,5 +1,6 @@
 """MANIFEST.json: all that shaped the rows of a study, and by which a run knows whether it may go on with what it finds."""
 
+import json
 import os
 import platform
 from importlib.metadata import version
@@ -62,7 +63,7 @@ class Manifest(Record):
             ),
             scenarios=tuple(numbered(preset.experiments)),
             machine={
-                "system": platform.platform(),
+                "system": f"{platform.system()} {platform.release()}",
                 "machine": platform.machine(),
                 "processors": str(os.cpu_count()),
                 "python": platform.python_version(),
@@ -78,10 +79,18 @@ class Manifest(Record):
         """
         path = out / FILE
         try:
-            return cls.model_validate_json(path.read_bytes())
+            found = json.loads(path.read_bytes())
+            if isinstance(found, dict) and found.get("format", FORMAT) != FORMAT:
+                said = f"format {found['format']} of lalliance {found.get('lalliance')}"
+                raise UserError(
+                    f"{path}: {said}; expected format {FORMAT}, as version {version('lalliance')} writes it"
+                )
+            return cls.model_validate_json(json.dumps(found))
         except OSError as error:
             raise UserError(f"{path}: {error.strerror}; expected the folder of a study") from None
-        except ValidationError as error:
+        except ValueError as error:
+            if not isinstance(error, ValidationError):
+                raise UserError(f"{path}: no JSON ({error}); expected what lalliance study run writes") from None
             first = error.errors()[0]
             where = ".".join(map(str, first["loc"])) or "the whole"
             raise UserError(f"{path}: {where}: {first['msg']}; expected what lalliance study run writes") from None
@@ -102,7 +111,7 @@ class Manifest(Record):
 
     def differs_from(self, other: "Manifest") -> str | None:
         """What keeps the rows of the two from being of one study, as `what one, not other`; None: nothing."""
-        for field in ("format", "lalliance", "preset", "seed", "missions"):
+        for field in ("lalliance", "preset", "seed", "missions"):
             mine, theirs = getattr(self, field), getattr(other, field)
             if mine != theirs:
                 return f"{field} {mine}, not {theirs}"
