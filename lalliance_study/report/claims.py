@@ -103,8 +103,8 @@ def judge(answers: Sequence[Answer], effect: Estimate | None, detail: str = "") 
         return Finding(Verdict.REPRODUCED, effect=effect, detail=told)
     if not yes or no >= REFUTED * (yes + no):
         return Finding(Verdict.NOT_REPRODUCED, effect=effect, detail=told)
-    what, where = telling(answers, counted=False)
-    return Finding(Verdict.DEPENDS, what, effect, f"{_counted(answers)} No say, by {what}: {where}. {detail}".strip())
+    told = f"{_counted(answers)} No say, by {_listed(answers, counted=False)}. {detail}".strip()
+    return Finding(Verdict.DEPENDS, most_telling(answers)[0], effect, told)
 
 
 def judge_somewhere(answers: Sequence[Answer], effect: Estimate | None, detail: str = "") -> Finding:
@@ -113,7 +113,7 @@ def judge_somewhere(answers: Sequence[Answer], effect: Estimate | None, detail: 
     verdict = Verdict.REPRODUCED if yes >= SOMEWHERE * len(answers) else Verdict.NOT_REPRODUCED
     told = _counted(answers)
     if 0 < yes < len(answers):
-        told += " Yes say, by {}: {}.".format(*telling(answers, counted=True))
+        told += f" Yes say, by {_listed(answers, counted=True)}."
     return Finding(verdict, effect=effect, detail=f"{told} {detail}".strip())
 
 
@@ -151,7 +151,7 @@ def circumstances(scenario: Scenario) -> str:
 #: What scenarios may differ in, and how a level of it is spelled.
 PROPERTIES: Mapping[str, Callable[[Scenario], tuple[float, str]]] = {
     "heterogeneity": lambda one: (one.heterogeneity, f"{one.heterogeneity:g} %"),
-    "who hears whom": lambda one: (0, "all hear all" if one.coverage >= one.robots else "some work unheard by some"),
+    "whether all hear of all work": lambda one: (0, "they do" if one.coverage >= one.robots else "they do not"),
     "coverage": lambda one: (one.coverage, _number(one.coverage)),
     "tasks per robot": lambda one: (one.tasks / one.robots, _number(one.tasks / one.robots)),
     "team size": lambda one: (one.robots, f"{one.robots} robots"),
@@ -160,8 +160,8 @@ PROPERTIES: Mapping[str, Callable[[Scenario], tuple[float, str]]] = {
 }
 
 
-def telling(answers: Sequence[Answer], *, counted: bool) -> tuple[str, str]:
-    """The property of scenarios that tells most about their answers, and for each level of it how many give the `counted` one.
+def most_telling(answers: Sequence[Answer]) -> list[str]:
+    """The properties of scenarios that tell something about their answers, beginning with the one that tells most.
 
     Most is the information that a level gives about an answer, less what as many levels would seem to give by chance alone
     (Miller's and Madow's correction).
@@ -177,11 +177,20 @@ def telling(answers: Sequence[Answer], *, counted: bool) -> tuple[str, str]:
         )
         return known - (len(levels) - 1) * (len(said) - 1) / (2 * total)
 
-    best = max(PROPERTIES, key=gain)
-    groups: dict[tuple[float, str], list[bool]] = {}
-    for one in answers:
-        groups.setdefault(PROPERTIES[best](one.scenario), []).append(one.yes is counted)
-    return best, ", ".join(f"{level[1]} ({sum(own)} of {len(own)})" for level, own in sorted(groups.items()))
+    first, *others = sorted(PROPERTIES, key=gain, reverse=True)
+    return [first, *(name for name in others if gain(name) > 0)]
+
+
+def _listed(answers: Sequence[Answer], *, counted: bool) -> str:
+    """How many scenarios give an answer at each level of the two most telling properties."""
+    told = []
+    for name in most_telling(answers)[:2]:
+        groups: dict[tuple[float, str], list[bool]] = {}
+        for one in answers:
+            groups.setdefault(PROPERTIES[name](one.scenario), []).append(one.yes is counted)
+        levels = [f"{level[1]} ({sum(own)} of {len(own)})" for level, own in sorted(groups.items())]
+        told.append(f"{name}: {', '.join(levels)}")
+    return "; by ".join(told)
 
 
 def ratio_of(comparisons: Sequence[Comparison]) -> Estimate | None:
