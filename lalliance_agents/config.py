@@ -7,18 +7,18 @@ makes of its own options is checked by the environment.
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
-from math import inf
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, GetPydanticSchema, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError, core_schema, to_json
 
-from lalliance_agents.fault_checks import contradiction, misfit
-from lalliance_agents.faults import AnyFault, Crash, Fault, Hang, robot_of
+from lalliance_agents.errors import exact
+from lalliance_agents.fault_checks import contradiction, ends_work, misfit
+from lalliance_agents.faults import AnyFault, Fault, describe, robot_of
 from lalliance_agents.model.parameters import Architecture, Learning, NotNegative, Parameters, Positive, Record
 from lalliance_agents.wire.keys import NAME_PATTERN
 
@@ -180,7 +180,8 @@ class Mission(Record):
     def _check_before_deadline(self, instant: float, path: tuple[str | int, ...]) -> None:
         if instant >= self.deadline:
             raise misplaced(
-                path, f"{instant:g} s is not before the mission's deadline; expected less than {self.deadline:g} s"
+                path,
+                f"{exact(instant)} s is not before the mission's deadline; expected less than {exact(self.deadline)} s",
             )
 
     def _check_rates(self) -> None:
@@ -189,8 +190,8 @@ class Mission(Record):
             if own.broadcast_period < self.control_period * (1 - 1e-9):
                 raise misplaced(
                     self._where(name, "broadcast_rate"),
-                    f"robot {name} cannot send {own.broadcast_rate:g} messages/s with a control_period of "
-                    f"{self.control_period:g} s; expected at most {1 / self.control_period:g}",
+                    f"robot {name} cannot send {exact(own.broadcast_rate)} messages/s with a control_period of "
+                    f"{exact(self.control_period)} s; expected at most {1 / self.control_period:g}",
                 )
             for teammate in self.teammates(name):
                 theirs = self.parameters_of(teammate)
@@ -232,7 +233,10 @@ class Mission(Record):
         wrong = misfit(fault, self.robots, lambda robot: self.robots[robot].tasks, like)
         robot = robot_of(fault)
         if wrong is None and robot is not None and fault.at < (joins := self.robots[robot].joins):
-            return ("at",), f"at {fault.at:g} s robot {robot} is not there; expected not before it joins, {joins:g} s"
+            sentence = (
+                f"at {exact(fault.at)} s robot {robot} is not there; expected not before it joins, {exact(joins)} s"
+            )
+            return ("at",), sentence
         return wrong
 
     def _check_live_trial(self) -> None:
@@ -295,21 +299,34 @@ class Mission(Record):
         for task in self.tasks:
             fastest = min(self.robots[robot].tasks[task] for robot in self.able(task))
             if fastest > self.deadline:
+                deadline = exact(self.deadline)
                 found.append(
-                    f"tasks.{task}: its fastest robot needs {fastest:g} s, longer than the deadline of {self.deadline:g} s"
+                    f"tasks.{task}: its fastest robot needs {exact(fastest)} s, longer than the deadline of {deadline} s"
                 )
-        for index, fault in enumerate(self.faults):
-            if only := self._last_able(fault):
-                found.append(
-                    f"faults.{index}: {robot_of(fault)} is the only robot for {', '.join(only)}; "
-                    "the mission cannot complete if that is still open"
-                )
-        return found
+        return [*found, *self._never_done()]
 
-    def _last_able(self, fault: Fault) -> list[str]:
-        if not isinstance(fault, Crash | Hang) or fault.end < inf:
-            return []
-        return [task for task in self.robots[fault.robot].tasks if self.able(task) == [fault.robot]]
+    def _never_done(self) -> Iterator[str]:
+        """Sentences about tasks for which no robot is left, or none is there at first."""
+        doomed: dict[str, list[str]] = {}
+        for task in self.tasks:
+            ends = [self._end_of_work(robot, task) for robot in self.able(task)]
+            if None not in ends:
+                told = " and ".join(f"{describe(fault)} at {fault.at:g} s" for fault in ends if fault is not None)
+                doomed.setdefault(told, []).append(f"tasks.{task}")
+            if sum(phase.trials for phase in self.phases) > 1 and all(
+                self.robots[robot].joins > 0 for robot in self.able(task)
+            ):
+                yield f"tasks.{task}: its robots join in the last trial; those before it cannot complete"
+        for told, tasks in doomed.items():
+            yield (
+                f"{', '.join(tasks)}: no robot is left for it after {told}; if it is still open then, the mission is not "
+                "expected to complete"
+            )
+
+    def _end_of_work(self, robot: str, task: str) -> Fault | None:
+        """The fault from which on `robot` does not work on `task` any more, if there is one."""
+        ending = [fault for fault in self.faults if robot_of(fault) == robot and ends_work(fault, task)]
+        return min(ending, key=lambda fault: fault.at, default=None)
 
 
 def like(word: str, known: Iterable[str]) -> str:

@@ -36,3 +36,8 @@ class MessageError(LallianceError):
     def __init__(self, reason: str, detail: str) -> None:
         super().__init__(f"{reason}: {detail}")
         self.reason = reason
+
+
+def exact(number: float) -> str:
+    """A number as a sentence about a limit tells it: with all the digits that set it apart from the limit."""
+    return repr(float(number)).removesuffix(".0")

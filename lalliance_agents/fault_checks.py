@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from fnmatch import fnmatchcase
 
 from lalliance_agents.faults import (
+    Blind,
     Crash,
     Fault,
     Hang,
@@ -32,7 +33,7 @@ def misfit(
     tasks_of: Callable[[str], Iterable[str]],
     like: Callable[[str, Iterable[str]], str],
 ) -> tuple[Place, str] | None:
-    """What of a fault does not fit the team, and where: robots that are not there, globs that match nobody.
+    """What of a fault does not fit the team, and where: robots that are not there, globs that match nobody, empty links.
 
     Args:
         fault: the fault.
@@ -52,6 +53,8 @@ def misfit(
                 return place, f"{glob!r} matches no robot of this mission{like(glob, team)}"
     if isinstance(fault, Partition):
         return _in_two_groups(fault, team)
+    if isinstance(fault, LinkFault):
+        return _between_nobody(fault, team)
     return None
 
 
@@ -71,6 +74,28 @@ def _in_two_groups(fault: Partition, team: list[str]) -> tuple[Place, str] | Non
             if fits(name, as_globs(group)) and seen.setdefault(name, index) != index:
                 return ("partition", index), f"{name} is in two groups of the partition; expected it in one"
     return None
+
+
+def _between_nobody(fault: LinkFault, team: list[str]) -> tuple[Place, str] | None:
+    if any(_covers(fault, sender, receiver) for sender in team for receiver in team if sender != receiver):
+        return None
+    alone = next(name for name in team if _covers(fault, name, name))
+    return ("link",), f"{alone} is the only robot at both ends, and none hears itself; expected two different robots"
+
+
+def ends_work(fault: Fault, task: str) -> bool:
+    """Whether from some time on its robot does not work on `task` with open eyes any more."""
+    if fault.end < math.inf:
+        return False
+    match fault:
+        case Crash() | Hang():
+            return True
+        case Blind():
+            return fault.delay is None
+        case Stuck():
+            return fault.task in {None, task}
+        case _:
+            return False
 
 
 def contradiction(fault: Fault, earlier: Fault, robots: Iterable[str]) -> str | None:

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
+from lalliance_agents.errors import exact
 from lalliance_agents.model.parameters import NotNegative, Positive, Record
 from lalliance_agents.wire.keys import NAME_PATTERN
 
@@ -38,7 +39,7 @@ class _Timed(Record):
     @model_validator(mode="after")
     def _check_until(self) -> Self:
         if self.until is not None and self.until <= self.at:
-            raise ValueError(f"until {self.until:g} s must come after at {self.at:g} s")
+            raise ValueError(f"until {exact(self.until)} s must come after at {exact(self.at)} s")
         return self
 
     @property
@@ -141,7 +142,7 @@ class Bursts(Record):
 
 def _check_order(pair: tuple[float, float]) -> tuple[float, float]:
     if pair[1] < pair[0]:
-        raise ValueError(f"the second number {pair[1]:g} s is below the first one {pair[0]:g} s")
+        raise ValueError(f"the second number {exact(pair[1])} s is below the first one {exact(pair[0])} s")
     return pair
 
 

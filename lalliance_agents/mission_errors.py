@@ -76,11 +76,11 @@ class Finding(NamedTuple):
 
 
 class _Told(NamedTuple):
-    """An error in words, still with the alternative of a union that it is about (`()`: there is no union)."""
+    """An error in words, still with the alternatives of unions that it is about, the outermost first."""
 
     place: Place
     depth: int
-    alternative: Place
+    alternatives: tuple[Place, ...]
     wrong: str
     hint: str
     missing: str = ""
@@ -107,7 +107,7 @@ def explain(
         prefix: where the record's values stand.
     """
     found: list[Finding] = []
-    unions: dict[Place, dict[Place, list[_Told]]] = {}
+    told_all: list[_Told] = []
     for error in errors:
         context = error.get("ctx", {})
         if error["type"] == "misplaced":
@@ -115,11 +115,8 @@ def explain(
             nested = explain(context.get("errors", ()), Parameters, spots, place)
             found += nested or [Finding(line_of(place, spots), place, context["message"])]
         elif told := _tell(error, record, spots, prefix):
-            unions.setdefault(told.alternative[:-1], {}).setdefault(told.alternative, []).append(told)
-    told_all: list[_Told] = []
-    for alternatives in unions.values():
-        told_all += alternatives.pop((), [])
-        told_all += _likeliest(alternatives) if alternatives else []
+            told_all.append(told)
+    told_all = _of_likeliest(told_all)
     misspelled = {told.meant for told in told_all if told.meant}
     return found + [
         Finding(line_of(told.key or told.place, spots), told.place, told.sentence)
@@ -161,13 +158,34 @@ def kind_of(value: object) -> str:
     return "nothing" if value is None else _KINDS.get(type(value), "something else")
 
 
-def _likeliest(alternatives: dict[Place, list[_Told]]) -> list[_Told]:
+def _of_likeliest(told_all: Iterable[_Told], level: int = 0) -> list[_Told]:
+    """What remains when each union, from the `level`-th around a value on inwards, is taken as one of its alternatives."""
+    left: list[_Told] = []
+    unions: dict[Place, dict[Place, list[_Told]]] = {}
+    for told in told_all:
+        if len(told.alternatives) <= level:
+            left.append(told)
+        else:
+            alternative = told.alternatives[level]
+            unions.setdefault(alternative[:-1], {}).setdefault(alternative, []).append(told)
+    for alternatives in unions.values():
+        left += _likeliest([_of_likeliest(inner, level + 1) for inner in alternatives.values()])
+    return left
+
+
+def _likeliest(alternatives: list[list[_Told]]) -> list[_Told]:
     """Of the alternatives of a union the one that fits best: its errors lie deepest. Where no kind fits, all in one."""
-    firsts = [told[0] for told in alternatives.values()]
+    if len(alternatives) == 1:
+        return alternatives[0]
+    firsts = [told[0] for told in alternatives]
     if all(told.place == firsts[0].place and told.depth == len(told.place) and not told.meant for told in firsts):
-        wanted = dict.fromkeys(told.hint.removeprefix("expected ") for told in firsts if told.hint)
+        # What ends with the value as it was probably meant comes last.
+        hints = sorted(
+            (told.hint.removeprefix("expected ") for told in firsts if told.hint), key=lambda hint: "," in hint
+        )
+        wanted = dict.fromkeys(hints)
         return [firsts[0]._replace(hint=f"expected {' or '.join(wanted)}" if wanted else "")]
-    return max(alternatives.values(), key=lambda told: (max(one.depth for one in told), -len(told)))
+    return max(alternatives, key=lambda told: (max(one.depth for one in told), -len(told)))
 
 
 def _tell(error: ErrorDetails, record: type[BaseModel], spots: Mapping[Place, Spot], prefix: Place) -> _Told | None:
@@ -176,11 +194,11 @@ def _tell(error: ErrorDetails, record: type[BaseModel], spots: Mapping[Place, Sp
     of_key, absent = loc[-1:] == ("[key]",), kind == "missing"
     place, dropped = _place(loc[:-1] if of_key or absent else loc, len(prefix), spots)
     spot = spots.get(place, Spot(0, error["input"]))
-    depth, alternative = len(place), () if dropped is None else loc[: dropped + 1]
+    depth, alternatives = len(place), tuple(loc[: index + 1] for index in dropped)
     if absent or kind == "union_tag_not_found":
-        return _missing(loc[-1] if absent else context["discriminator"].strip("'"), place, alternative)
+        return _missing(loc[-1] if absent else context["discriminator"].strip("'"), place, alternatives)
     if kind == "extra_forbidden":
-        return _unknown(place, _fields(record, place[len(prefix) : -1], loc), alternative)
+        return _unknown(place, _fields(record, place[len(prefix) : -1], loc), alternatives)
     if kind == "too_short" and len(spot.value) >= context["min_length"]:
         return None
     if kind == "union_tag_invalid":
@@ -189,22 +207,24 @@ def _tell(error: ErrorDetails, record: type[BaseModel], spots: Mapping[Place, Sp
     key: Place = ()
     if of_key:
         spot, key, place = Spot(spot.line, place[-1]), place, place[:-1]
-    if kind in _EXPECTED and not kind.endswith(_OF_KIND):
+    if not kind.endswith(_OF_KIND):
         depth += 1
-    return _Told(place, depth, alternative, *_judge(kind, context, spot, error["msg"]), key=key)
+    return _Told(place, depth, alternatives, *_judge(kind, context, spot, error["msg"]), key=key)
 
 
-def _missing(field: str | int, place: Place, alternative: Place) -> _Told:
+def _missing(field: str | int, place: Place, alternatives: tuple[Place, ...]) -> _Told:
     if isinstance(field, int):
-        return _Told(place, len(place) + 1, alternative, "an entry is missing", f"expected {field + 1} or more entries")
+        return _Told(
+            place, len(place) + 1, alternatives, "an entry is missing", f"expected {field + 1} or more entries"
+        )
     hint = f"expected a field {field!r}"
-    return _Told(place, len(place) + 1, alternative, "a field is missing", hint, missing=field)
+    return _Told(place, len(place) + 1, alternatives, "a field is missing", hint, missing=field)
 
 
-def _unknown(place: Place, known: list[str], alternative: Place) -> _Told:
+def _unknown(place: Place, known: list[str], alternatives: tuple[Place, ...]) -> _Told:
     hint = like(str(place[-1]), known).removeprefix("; ")
     meant = (*place[:-1], hint.removeprefix("did you mean ").strip("'?")) if hint else ()
-    return _Told(place, len(place), alternative, "unknown field", hint or f"expected {_one_of(known)}", meant=meant)
+    return _Told(place, len(place), alternatives, "unknown field", hint or f"expected {_one_of(known)}", meant=meant)
 
 
 def _judge(kind: str, context: dict[str, Any], spot: Spot, message: str) -> tuple[str, str]:
@@ -252,8 +272,8 @@ def _one_of(options: Iterable[str]) -> str:
     return listed[0] if len(listed) == 1 else f"one of {', '.join(listed)}"
 
 
-def _place(loc: Place, fixed: int, spots: Mapping[Place, Spot]) -> tuple[Place, int | None]:
-    """The place in the file that pydantic means by `loc`, and the index of the first part that the file does not have.
+def _place(loc: Place, fixed: int, spots: Mapping[Place, Spot]) -> tuple[Place, tuple[int, ...]]:
+    """The place in the file that pydantic means by `loc`, and the indices of the parts that the file does not have.
 
     Pydantic counts the alternative of a union as a part of the place: up to two such parts are left out. The first
     `fixed` parts are no alternatives.
@@ -262,8 +282,8 @@ def _place(loc: Place, fixed: int, spots: Mapping[Place, Spot]) -> tuple[Place, 
         for left_out in combinations(range(fixed, len(loc)), number):
             place = tuple(part for index, part in enumerate(loc) if index not in left_out)
             if place in spots:
-                return place, min(left_out, default=None)
-    return loc, None
+                return place, left_out
+    return loc, ()
 
 
 def _fields(record: type[BaseModel], place: Place, loc: Place) -> list[str]:

@@ -55,6 +55,11 @@ def parse_mission(text: str, source: str) -> Mission:
     return MissionText(text, source).mission()
 
 
+#: A string of JSON, or a number that is none, which Python writes into JSON all the same.
+_STRING_OR_NO_NUMBER = re.compile(r'"(?:[^"\\]|\\.)*"|-?Infinity|NaN')
+_IN_YAML = {"Infinity": ".inf", "-Infinity": "-.inf", "NaN": ".nan"}
+
+
 class _OneFault(Record):
     """A document that holds one fault."""
 
@@ -71,7 +76,9 @@ def read_fault(text: str) -> Fault:
     try:
         content = json.loads(text)
         document = {"fault": {"at": 0, **content} if isinstance(content, dict) else content}
-        holder = MissionText(json.dumps(document, ensure_ascii=False), source)
+        spelled = json.dumps(document, ensure_ascii=False)
+        spelled = _STRING_OR_NO_NUMBER.sub(lambda found: _IN_YAML.get(found[0], found[0]), spelled)
+        holder = MissionText(spelled, source)
         try:
             return _OneFault.model_validate_json(json.dumps(holder.document), strict=True).fault
         except ValidationError as error:

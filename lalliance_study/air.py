@@ -5,6 +5,9 @@ teammate, and that matters only when it is next asked. So a message waits at its
 refreshes it then takes the last; only a message that may be news wakes the hearer when it comes. A message may be news if it
 says something else than the message before on the same link, if it comes out of order, or after a silence that the hearer may
 have noticed.
+
+Where no rule touches any link of a speaker, and each hearer has been sent what it has to say, its links are settled: nobody
+waits for its refreshes, and they are not even made before somebody looks. Then the last that has come stands for all.
 """
 
 from collections import Counter, deque
@@ -25,6 +28,8 @@ class Spoken(NamedTuple):
     content: object
     """What it says, as an object of its own: refreshes share it."""
     heard: Heard
+    first: int | None = None
+    """The number of the first of the row that it stands for, if it stands for more than itself."""
 
 
 class Hearer(Protocol):
@@ -35,6 +40,33 @@ class Hearer(Protocol):
     trial: int
     there: bool
     """Whether it has a process, and with that somewhere for messages to arrive."""
+    heeded: set[str]
+    """The teammates on settled links: they cannot fall silent unnoticed."""
+
+    def doubt(self, instant: float, now: float) -> None:
+        """A teammate that was heeded until `now` may fall silent, but not before `instant`."""
+
+    @property
+    def runs(self) -> bool:
+        """Whether its process runs."""
+
+
+class Speaker(Protocol):
+    """Whoever speaks at the beginning of a link."""
+
+    name: str
+    longest_gap: float
+    """The longest time between two of its announcements, in seconds."""
+    latest: Spoken | None
+    """While its links are settled: the last refresh that has come, as far as they were made."""
+    unmade: float
+    """When the first comes that was not made; infinite if its links are not settled."""
+
+    def catch_up(self, now: float) -> None:
+        """Make all that has come until `now`."""
+
+    def unsettle(self, now: float) -> None:
+        """Somebody waits for what it says next: from now on its announcements go out one by one."""
 
 
 #: A silence is news a little before the hearer could notice it, in seconds.
@@ -45,16 +77,17 @@ class AirLink:
     """The way of one robot's messages to one teammate.
 
     Args:
-        sender: the robot's name.
+        speaker: the robot.
         hearer: the teammate.
         announce_news: called with the instant at which a message comes that may be news.
         every_step: whether every message is taken for news.
     """
 
     def __init__(
-        self, sender: str, hearer: Hearer, announce_news: Callable[[float], None], *, every_step: bool
+        self, speaker: Speaker, hearer: Hearer, announce_news: Callable[["AirLink", float], None], *, every_step: bool
     ) -> None:
-        self.sender = sender
+        self.speaker = speaker
+        self.sender = speaker.name
         self.hearer = hearer
         self.rule: RuledLink | None = None
         self.waiting: deque[Spoken] = deque()
@@ -67,17 +100,23 @@ class AirLink:
         self._task: str | None = None
         self._latest = 0.0
         self._incarnation = self._seq = -1
+        self._in_order = False
+        self._can_settle = not every_step and speaker.longest_gap < hearer.tau - EARLY
+        #: Whether what is said here is not made before somebody looks.
+        self.settled = False
 
     def __repr__(self) -> str:
         return f"<link {self.sender} -> {self.hearer}, {len(self.waiting)} waiting>"
 
-    def forget(self, task: str | None = None) -> None:
+    def forget(self, now: float, task: str | None = None) -> None:
         """Whatever comes next is news, if it is about `task`: the hearer has changed its mind, not the speaker."""
         if task is None or task == self._task:
+            self.speaker.unsettle(now)
             self._content = None
 
-    def reset(self) -> None:
+    def reset(self, now: float) -> None:
         """The hearer begins a new life, which has heard nothing."""
+        self.speaker.unsettle(now)
         self.waiting.clear()
         self._content = None
         self._incarnation = self._seq = -1
@@ -108,9 +147,11 @@ class AirLink:
         gap = arrives - self._latest
         if spoken.content is self._content and 0.0 <= gap <= self.hearer.tau - EARLY and not self._every_step:
             self._latest = arrives
+            self._in_order = True
             self.waiting.append(spoken)
             return
         self._content, self._task = spoken.content, spoken.heard.task
+        self._in_order = gap >= 0.0
         if gap >= 0.0:
             self._latest = arrives
             self.waiting.append(spoken)
@@ -120,21 +161,57 @@ class AirLink:
                 self.waiting.pop()
             self.waiting.append(spoken)
             self.waiting.extend(later)
-        self._announce_news(arrives)
+        self._announce_news(self, arrives)
+
+    def can_settle(self, content: object) -> bool:
+        """Whether what the speaker goes on to say is no news to the hearer, if it has one."""
+        if not self.hearer.there:
+            return True
+        steady = self._can_settle and self._in_order and self.rule is None
+        return steady and self._content is content and self.hearer.runs
+
+    def settle(self) -> None:
+        """From now on nobody waits for what comes."""
+        self.settled = True
+        if self.hearer.there:
+            self.hearer.heeded.add(self.sender)
+
+    def unsettle(self, now: float) -> None:
+        """Have what has come, and was not taken, wait like everything else."""
+        self.settled = False
+        latest = self.speaker.latest
+        if not self.hearer.there:
+            return
+        if latest is not None:
+            self._latest = latest.arrives
+            if self._is_new(latest):
+                self.waiting.append(latest)
+        self.hearer.heeded.discard(self.sender)
+        self.hearer.doubt(self._latest + self.hearer.tau - EARLY, now)
+
+    def _is_new(self, spoken: Spoken) -> bool:
+        return (spoken.incarnation, spoken.seq) > (self._incarnation, self._seq)
 
     def take(self, now: float, *, each: bool) -> list[Spoken]:
         """What has come until `now` and is fresh: of a row of refreshes the last, or `each` of them."""
         waiting, taken = self.waiting, []
+        if self.settled:
+            if self.speaker.unmade <= now:
+                self.speaker.catch_up(now)
+            latest = self.speaker.latest
+            if latest is not None and self._is_new(latest):
+                waiting.append(latest)
         last: Spoken | None = None
         while waiting and waiting[0].arrives <= now:
             spoken = waiting.popleft()
-            if (spoken.incarnation, spoken.seq) <= (self._incarnation, self._seq):
+            if not self._is_new(spoken):
                 self.stale += 1
                 continue
+            row = 1 if spoken.first is None else spoken.seq - max(self._seq, spoken.first - 1)
             self._incarnation, self._seq = spoken.incarnation, spoken.seq
-            self.received += 1
+            self.received += row
             if spoken.trial != self.hearer.trial:
-                self.strange += 1
+                self.strange += row
                 continue
             if last is not None and (each or last.content is not spoken.content):
                 taken.append(last)

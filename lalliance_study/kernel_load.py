@@ -175,8 +175,9 @@ def begin_trial(w: Memory, rules: Rules) -> None:
 
 @compiled
 def next_trial(w: Memory, rules: Rules) -> None:
-    """The trial after the first, or one after it."""
+    """The trial after the first, or one after it; what is counted is counted anew."""
     w.training -= 1
+    w.sent = w.activations = w.takeovers = 0
     for robot in range(w.n):
         for index in range(w.r_sets[robot]):
             task = w.set_task[robot * TASKS + index]

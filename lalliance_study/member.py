@@ -2,7 +2,8 @@
 
 The mind is the very one that runs on the bus. Of its control steps only those are made in which something may happen: the
 mind says when that is (`Mind.wake`, `Mind.next_lapse`), events make it sooner, and where nothing but an announcement is due it
-only beats. The result is the same as if all steps had been made; `every_step` makes them all, to show it.
+only beats; where nobody waits for that either (see `air`), it beats when somebody looks. The result is the same as if all steps
+had been made; `every_step` makes them all, to show it.
 """
 
 import math
@@ -14,12 +15,14 @@ from lalliance_agents.agent import translate
 from lalliance_agents.agent.behavior import TaskSense
 from lalliance_agents.agent.briefing import new_mind, roster, tasks_of
 from lalliance_agents.config import Mission
-from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, Heard, TrialStarted
+from lalliance_agents.model.events import Activate, Announce, Command, Deactivate, Decision, TrialStarted
 from lalliance_agents.model.mind import Mind
+from lalliance_agents.model.outlook import AT_ONCE
 from lalliance_agents.model.parameters import SLACK
 from lalliance_agents.wire.messages import Effect
-from lalliance_study.air import AirLink, Spoken
+from lalliance_study.air import AirLink
 from lalliance_study.circumstances import Circumstances
+from lalliance_study.voice import NEVER, Grid, Voice
 
 
 class Process(Enum):
@@ -69,13 +72,19 @@ class Member:
         self.there = False
         self.incarnation = 0
         self.trial = 0
-        self.tau = mission.parameters_of(name).silence_timeout
-        self.sent = self.steps = self.beats = 0
-        #: Links to those who hear it on a task, and idle.
-        self.heard_on: dict[str, list[AirLink]] = {task: [] for task in self.tasks}
-        self.heard_idle: list[AirLink] = []
+        self.steps = 0
         #: Links from those whom it hears.
         self.hears: list[AirLink] = []
+        self.heeded: set[str] = set()
+        own = mission.parameters_of(name)
+        self.tau = own.silence_timeout
+        self.voice = Voice(
+            name,
+            longest_gap=own.broadcast_period + 2 * mission.control_period,
+            delay=message_delay,
+            rescheduled=self._schedule,
+        )
+        self.voice.on = {task: [] for task in self.tasks}
         #: The instant of its next control step, in seconds; infinite while there is none.
         self.due = math.inf
         self.task: str | None = None
@@ -83,12 +92,10 @@ class Member:
         self.effects: Counter[tuple[str, str]] = Counter()
         self._mission = mission
         self._circumstances = circumstances
-        self._delay = message_delay
         self._every_step = every_step
         self._decided = decided
         self._rescheduled = rescheduled
         self._sensed = sensed
-        self._period = mission.control_period
         self._mind: Mind | None = None
         self.stopped_at = 0.0
         self._lived = self._missed = 0
@@ -112,6 +119,9 @@ class Member:
 
     def start(self, now: float) -> None:
         """Begin a new life."""
+        for link in self.hears:
+            self._keep(link)
+            link.reset(now)
         self.process = Process.RUNNING
         self.there = True
         self.incarnation += 1
@@ -122,17 +132,14 @@ class Member:
         self.trial = 0
         self.task = None
         self._told.clear()
-        self._seq = 0
-        self._content: object = None
         self._step = 0  # the control steps made or left out so far
-        self._first = now + chance.random() * self._period
+        period = self._mission.control_period
+        self._grid = Grid(now + chance.random() * period, period)
+        self.voice.begin(self._mind, self._grid, self.incarnation, now)
         self._after_pause = True
         self._missed = 0
-        for link in self.hears:
-            self._keep(link)
-            link.reset()
-        self._wake_step = self._lapse_step = self._beat_step = 0
-        self._broadcast_due = now
+        self._wake_step = self._lapse_step = 0
+        self._wanted = AT_ONCE
         self._schedule()
 
     def periods(self, now: float) -> int:
@@ -140,11 +147,12 @@ class Member:
         return self._lived + (self._periods_here(now) if self.runs else 0)
 
     def _periods_here(self, now: float) -> int:
-        return max(int((now - self._first) / self._period) + 1 - self._missed, 0)
+        return max(int((now - self._grid.first) / self._grid.period) + 1 - self._missed, 0)
 
     def kill(self, now: float) -> None:
         """End as by SIGKILL."""
         if self.runs:
+            self.take_stock(now)
             self._lived += self._periods_here(now)
         self.process = Process.GONE
         self.there = False
@@ -156,11 +164,14 @@ class Member:
         """Stop as by SIGSTOP."""
         if self.runs:
             self._listen(now)  # what has come until now is heard, also if it was to be looked at later
+            self.voice.unsettle(now)
+            for link in self.hears:
+                link.speaker.unsettle(now)
             self.process = Process.STOPPED
             self.stopped_at = now
             self.given_up = False
             # The steps before were made, if only in effect.
-            self.mind.rest(self._instant(self._step_from(now) - 1))
+            self.mind.rest(self._grid.instant(self._step_from(now) - 1))
             self._schedule()
 
     def resume(self, now: float) -> bool:
@@ -172,13 +183,13 @@ class Member:
         for link in self.hears:
             if lost:
                 link.waiting.clear()
-                link.forget()
-        self._step = max(math.ceil((now - self._first) / self._period - SLACK), self._step)
-        self._missed += int((now - self.stopped_at) / self._period)
+                link.forget(now)
+        self._step = max(math.ceil((now - self._grid.first) / self._grid.period - SLACK), self._step)
+        self._missed += int((now - self.stopped_at) / self._grid.period)
         self._after_pause = True
         self._wake_step = self._step
         self._lapse_step = max(self._lapse_step, self._step)
-        self._beat_step = max(self._beat_step, self._step)
+        self.voice.wait_until(self._step)
         if not lost:
             self._listen(now, each=True)  # no news was looked at meanwhile: any of them may be some
         self._schedule()
@@ -204,15 +215,16 @@ class Member:
         if trial > self.trial:
             self.trial = trial
             self.task = None
-            self._content = None
+            self.voice.turn(now, trial)
             self._told.clear()
             self.mind.handle(TrialStarted(translate.learning(learning)), now)
             for link in self.hears:
-                link.forget()
-            self._wake(now)
+                link.forget(now)
+            self._heed(now)
         for task, applicable, complete in views:
-            if task in self.heard_on:
+            if task in self.voice.on:
                 self._feel(task, TaskSense(applicable, complete, 0.0), now)
+        self._expect_lapse(self.mind.next_lapse(self.heeded), now)
 
     def _feel(self, task: str, sense: TaskSense, now: float) -> None:
         felt = sense.applicable, sense.complete
@@ -222,48 +234,57 @@ class Member:
                 self._sensed(now, self.name, task, *felt)
             self.mind.handle(translate.sensed(task, *felt), now)
             for link in self.hears:
-                link.forget(task)
-            self._wake(now)
+                link.forget(now, task)
+            self._heed(now)
 
-    def news(self, now: float) -> None:
+    def news(self, link: AirLink, now: float) -> None:
         """A message has come that may be news."""
         if self.runs:
-            self._listen(now)
+            self._take(link, now, each=False)
+            self._heed(now)
+            self._expect_lapse(self.mind.next_lapse(self.heeded), now)
 
-    def _listen(self, now: float, *, each: bool = False) -> None:
-        """Take in what has come until `now`: of rows of refreshes the last, or `each`."""
-        mind = self.mind
+    def doubt(self, instant: float, now: float) -> None:
+        """See `air.Hearer`."""
+        if self.runs:
+            self._expect_lapse(instant, now)
+
+    def _expect_lapse(self, instant: float, now: float) -> None:
+        if not self._every_step and (step := self._step_from(max(instant, now))) < self._lapse_step:
+            self._lapse_step = step
+            self._schedule()
+
+    def _listen(self, now: float, *, each: bool = False, to_all: bool = True) -> None:
+        """Take in what has come until `now`: of rows of refreshes the last, or `each`; `to_all`, or to whom nobody heeds."""
         for link in self.hears:
-            if link.waiting:
-                for spoken in link.take(now, each=each or self._every_step):
-                    mind.handle(spoken.heard, spoken.arrives)
-        if mind.wake() < now:
-            self._wake(now)
+            if (link.settled and to_all) or link.waiting:
+                self._take(link, now, each=each)
+        self._heed(now)
 
-    def _instant(self, step: int) -> float:
-        return self._first + step * self._period
+    def _take(self, link: AirLink, now: float, *, each: bool) -> None:
+        taken = link.take(now, each=each or self._every_step)
+        if taken:
+            mind = self.mind
+            for spoken in taken:
+                mind.handle(spoken.heard, spoken.arrives)
 
     def _step_from(self, instant: float) -> int:
         """The first control step that is not before `instant` and still to come."""
-        if instant == math.inf:
-            return NEVER
-        if instant <= self._instant(self._step):
-            return self._step
-        step = max(math.ceil((instant - self._first) / self._period - SLACK), self._step)
-        while self._instant(step) < instant:
-            step += 1
-        return step if self._instant(step - 1) < instant else step - 1
+        return self._grid.step_from(instant, self._step)
 
-    def _wake(self, now: float) -> None:
-        """Make a whole step as soon as possible."""
-        step = self._step_from(now)
-        if step < self._wake_step or self._wake_step < self._step:
-            self._wake_step = step
-            self._schedule()
+    def _heed(self, now: float) -> None:
+        """Make a whole step when the mind wants one, after it has perceived something."""
+        wanted = self.mind.wake()
+        if wanted != self._wanted:
+            self._wanted = wanted
+            step = self._step_from(max(wanted, now))
+            if step < self._wake_step or self._wake_step < self._step:
+                self._wake_step = step
+                self._schedule()
 
     def _schedule(self) -> None:
-        self._next = min(self._wake_step, self._lapse_step, self._beat_step)
-        due = self._first + self._next * self._period if self.runs else math.inf
+        self._next = min(self._wake_step, self._lapse_step, self.voice.due_step)
+        due = self._grid.instant(self._next) if self.runs else math.inf
         if due != self.due:
             self.due = due
             self._rescheduled(self)
@@ -274,24 +295,28 @@ class Member:
         whole = step >= self._wake_step
         if not whole and step >= self._lapse_step:
             self._step = step
-            self._listen(now)
-            self._lapse_step = self._step_from(mind.next_lapse())
+            self._listen(now, to_all=False)
+            self._lapse_step = self._step_from(mind.next_lapse(self.heeded))
             whole = step >= self._lapse_step or step >= self._wake_step
-        if whole or step >= self._beat_step:
+        if whole or step >= self.voice.due_step:
+            self.voice.prepare(step, now)
             if not self._after_pause:
-                mind.rest(self._instant(step - 1))
+                mind.rest(self._grid.instant(step - 1))
             self._after_pause = False
             self._step = step + 1
             if whole:
                 self._listen(now)
                 self._think(now)
             else:
-                self.beats += 1
-                self._perform(mind.beat(now), now)
-            if mind.broadcast_due != self._broadcast_due or self._beat_step <= step:
-                self._broadcast_due = mind.broadcast_due
-                self._beat_step = self._next_beat(step + 1)
+                self.voice.beat(now)
+            self.voice.made(step)
         self._schedule()
+
+    def take_stock(self, now: float) -> None:
+        """Make and take in all that has come until `now`, so that it is counted."""
+        if self.runs:
+            self.voice.unsettle(now)
+            self._listen(now)
 
     def _think(self, now: float) -> None:
         self.steps += 1
@@ -300,41 +325,16 @@ class Member:
             self._wake_step = self._step
             self._lapse_step = NEVER
         else:
-            self._wake_step = self._step_from(self.mind.wake())
-            self._lapse_step = self._step_from(self.mind.next_lapse())
-
-    def _next_beat(self, step: int) -> int:
-        """The first step from `step` on at which an announcement is due, if all steps are made."""
-        before, is_due = self._instant(step - 1), self.mind.is_broadcast_due
-        while not is_due(now := self._instant(step), before):
-            before = now
-            step += 1
-        return step
+            self._wanted = self.mind.wake()
+            self._wake_step = self._step_from(self._wanted)
+            self._lapse_step = self._step_from(self.mind.next_lapse(self.heeded))
 
     def _perform(self, commands: list[Command], now: float) -> None:
         for command in commands:
             match command:
                 case Announce():
-                    self._announce(command, now)
-                case Activate():
-                    self.task = command.decision.task
-                    self._content = None
+                    self.voice.announce(command, now)
+                case Activate() | Deactivate():
+                    self.task = command.decision.task if isinstance(command, Activate) else None
+                    self.voice.turn(now)
                     self._decided(self, command.decision)
-                case Deactivate():
-                    self.task = None
-                    self._content = None
-                    self._decided(self, command.decision)
-
-    def _announce(self, said: Announce, now: float) -> None:
-        self.sent += 1
-        self._seq += 1
-        if self._content is None:
-            self._content = object()
-        heard = Heard(self.name, said.task, said.active_for, said.expected)
-        spoken = Spoken(now + self._delay, self.incarnation, self._seq, self.trial, self._content, heard)
-        for link in self.heard_idle if said.task is None else self.heard_on[said.task]:
-            link.send(spoken)
-
-
-#: The number of a control step that is never made.
-NEVER = 2**62

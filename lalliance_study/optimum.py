@@ -253,13 +253,22 @@ def times_of(mission: Mission) -> Floats:
     return np.array(rows, dtype=np.float64)
 
 
-def optimum_of(mission: Mission, hand_over: HandOver | None = None, *, time_limit: float = TIME_LIMIT) -> Yardstick:
+def optimum_of(
+    mission: Mission,
+    hand_over: HandOver | None = None,
+    *,
+    tolerance: float = TOLERANCE,
+    time_limit: float = TIME_LIMIT,
+    work_limit: float = math.inf,
+) -> Yardstick:
     """The optimum of a mission with independent tasks that are there from the start, and a team without faults.
 
     Args:
         mission: the mission.
         hand_over: the yardstick; by default that of the mission, below which it cannot come. The paper's is `restart`.
+        tolerance: as of `optimum`, as the two limits.
         time_limit: of the search, in seconds.
+        work_limit: of the search, in CP-SAT's deterministic seconds.
 
     Raises:
         NoYardstickError: a mission of another kind.
@@ -272,7 +281,9 @@ def optimum_of(mission: Mission, hand_over: HandOver | None = None, *, time_limi
     if rule not in get_args(HandOver):
         raise UserError(f"hand_over is {rule!r}; expected one of {', '.join(get_args(HandOver))}")
     times = times_of(mission)
-    return optimum(times, time_limit=time_limit) if rule == "restart" else shared_optimum(times, rule)
+    if rule != "restart":
+        return shared_optimum(times, rule)
+    return optimum(times, tolerance=tolerance, time_limit=time_limit, work_limit=work_limit)
 
 
 def _why_not(mission: Mission) -> str | None:

@@ -1,7 +1,7 @@
 """Work on all cores: parts go to processes of their own, and results come as they are ready.
 
-Ctrl-C is for the parent alone: it ends the children and says what it has. Children end with their parent, whatever that dies
-of.
+Ctrl-C and a request to end are for the parent alone: it ends the children and says what it has. Children end with their parent,
+whatever that dies of.
 """
 
 import multiprocessing
@@ -82,8 +82,8 @@ def _submit(pool: ProcessPoolExecutor, work: Callable[..., T], part: tuple[Any, 
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDS)
         for number, handler in before.items():
             signal.signal(number, handler)
-        for number in came:
-            signal.raise_signal(number)
+        for told in came:
+            signal.raise_signal(told)
 
 
 def _begin(parent: int) -> None:

@@ -21,6 +21,7 @@ import math
 from dataclasses import dataclass
 
 from lalliance_agents.config import Mission
+from lalliance_agents.fault_checks import ends_work
 from lalliance_agents.faults import (
     Blind,
     Crash,
@@ -81,20 +82,9 @@ def settled_after(mission: Mission) -> float:
 
 
 def strikes_for_good(fault: Fault, task: str) -> bool:
-    """Whether from some time on its robot does not work on `task` with open eyes any more."""
-    if fault.end < math.inf:
-        return False
-    match fault:
-        case Crash() | Hang():
-            return True
-        case Blind():
-            return fault.delay is None
-        case Stuck():
-            return fault.task in {None, task}
-        case Slow():
-            return fault.factor > AS_GOOD_AS_STUCK
-        case _:
-            return False
+    """Whether its robot is of no use for `task` from some time on."""
+    too_slow = isinstance(fault, Slow) and fault.end == math.inf and fault.factor > AS_GOOD_AS_STUCK
+    return too_slow or ends_work(fault, task)
 
 
 def sound(mission: Mission, task: str) -> list[str]:

@@ -150,11 +150,16 @@ def _loss(chance: random.Random) -> float | Document:
 def _delay(chance: random.Random) -> float | Document:
     kind = chance.random()
     if kind < 0.33:
-        return round(chance.uniform(0.0, 1.5), 3)
+        return _some(chance.uniform(0.0, 1.5))
     if kind < 0.66:
         low = round(chance.uniform(0.0, 0.5), 3)
-        return {"uniform": [low, round(low + chance.uniform(0.0, 1.5), 3)]}
+        return {"uniform": [low, _some(low + chance.uniform(0.0, 1.5))]}
     return {"lognormal": {"median": round(chance.uniform(0.02, 0.5), 3), "sigma": round(chance.uniform(0.1, 1.5), 3)}}
+
+
+def _some(delay: float) -> float:
+    """A delay in whole milliseconds, at least one: a rule that delays by nothing can never fire."""
+    return max(round(delay, 3), 0.001)
 
 
 def _rule(chance: random.Random, robots: Document, _: str) -> Document:

@@ -17,18 +17,14 @@ from lalliance_agents.bus.link import LinkRules
 from lalliance_agents.config import Mission
 from lalliance_agents.faults import Fault
 from lalliance_agents.model.events import Decision
-from lalliance_agents.wire.keys import WORLD
 from lalliance_agents.wire.messages import Action, DecisionMade, LinkReport
 from lalliance_study.air import AirLink
 from lalliance_study.circumstances import Circumstances, Mishaps
 from lalliance_study.logbook import Follower, Line, Timing, Watcher
 from lalliance_study.member import Member, Process
-from world_server.environments.base import TaskView
+from lalliance_study.senses import Senses
 from world_server.failures import Deed, Order
 from world_server.world import REFRESH_PERIOD, Happening, Stage, World
-
-Senses = tuple[int, str, list[tuple[str, bool, bool]]]
-"""What the world says of tasks: the trial, its way of learning, and of each task whether it is applicable, and complete."""
 
 
 class Simulator:
@@ -79,11 +75,9 @@ class Simulator:
         self._rules: LinkRules | None = None
         self._look_at = math.inf
         self._looked = -1
-        self._seen: dict[str, tuple[int, bool, bool]] = {}
-        self._late: set[str] = set()
-        self._blind: dict[str, tuple[str, float | None]] = {}
-        #: Of robots whose senses were held back: when what they know of each task was said.
-        self._tardy: dict[str, dict[str, float]] = {}
+        self._senses = Senses(self.world, self.members, self._timing.message_delay, self._at)
+        #: Whether a fault may have done something to what robots hear or sense.
+        self._disturbed = False
         self._served: set[int] = set()
         self._actions: dict[str, Action] = {}
         self._reported: dict[str, int] = {}
@@ -99,25 +93,24 @@ class Simulator:
         for name, member in self.members.items():
             for mate in self.mission.teammates(name):
                 hearer = self.members[mate]
-                link = AirLink(name, hearer, self._news_for(hearer), every_step=every_step)
+                link = AirLink(member.voice, hearer, self._announce_news, every_step=every_step)
                 links.append(link)
                 hearer.hears.append(link)
-                member.heard_idle.append(link)
+                member.voice.idle.append(link)
                 for task in member.tasks:
-                    if task in hearer.heard_on:
-                        member.heard_on[task].append(link)
+                    if task in hearer.tasks:
+                        member.voice.on[task].append(link)
         return links
 
-    def _news_for(self, hearer: Member) -> Callable[[float], None]:
-        def announce(at: float) -> None:
-            self._at(at, 0, self._bring_news, hearer)
+    def _announce_news(self, link: AirLink, at: float) -> None:
+        self._at(at, 0, self._bring_news, link)
 
-        return announce
-
-    def _bring_news(self, hearer: Member) -> None:
-        hearer.news(self.now)
+    def _bring_news(self, link: AirLink) -> None:
+        self.members[link.hearer.name].news(link, self.now)
 
     def _at(self, instant: float, priority: int, deed: Callable[..., None], *arguments: Any) -> None:
+        if instant < self.now:
+            raise ValueError(f"{deed.__name__} was asked for at {instant!r} s, and it is {self.now!r} s")
         self._serial += 1
         heapq.heappush(self._heap, (instant, priority, self._serial, deed, arguments))
 
@@ -197,8 +190,7 @@ class Simulator:
         self.world.presence(name, present, self.now)
         self._mishaps.look(name, self.now)
         if present and self.world.trial and not self.world.over:
-            self._late.discard(name)
-            self._soon(self._sense, name, self._whole_view())
+            self._senses.tell_all(name, self.now)
         self._look()
 
     def _lapse(self, name: str, incarnation: int, since: float) -> None:
@@ -231,7 +223,7 @@ class Simulator:
                 if member.process is Process.STOPPED:
                     self._note(order.robot, "continued")
                 if member.resume(self.now):
-                    self._late.add(order.robot)
+                    self._senses.missed(order.robot)
                     self._soon(self._see_again, order.robot)
         self._served.add(order.number)
         self._soon(self._confirm, order.number)
@@ -313,21 +305,17 @@ class Simulator:
                     before = self._action(member)
                 self.world.act(before, self.now)
                 self._mishaps.look(member.name, self.now)
-        self._report(final=False)
-        for name in list(self._late):
-            # Senses that come late are refreshed all the same, and the refresh comes late.
-            held_back = name in self._blind and self._blind[name][1] is None
-            if self.members[name].runs and not held_back:
-                self._late.discard(name)
-                self._soon(self._sense, name, self._whole_view())
-        for name, (fault, _) in self._blind.items():
-            if self.members[name].runs:
-                self.members[name].effects[fault, WORLD] += len(self.members[name].tasks)
+        if self._disturbed:
+            self._report(final=False)
+        self._senses.refresh(self.now)
         self._at(self.now + REFRESH_PERIOD, 0, self._refresh)
         self._look()
 
     def _report(self, *, final: bool) -> None:
         """Tell the world what robots sent and received: all at the end, and meanwhile those to whom a fault did something."""
+        if final:
+            for member in self.members.values():
+                member.take_stock(self.now)
         for member in self.members.values():
             effects = member.total_effects()
             touched = sum(effect.count for effect in effects)
@@ -349,7 +337,7 @@ class Simulator:
             incarnation=1,
             seq=self._seq,
             at=self.now,
-            sent=member.sent,
+            sent=member.voice.sent,
             received=sum(link.received for link in member.hears),
             dropped={reason: count for reason, count in dropped.items() if count},
             teammates={},
@@ -386,65 +374,17 @@ class Simulator:
             if order.number not in self._served:
                 self._soon(self._carry_out, order)
         self._put_rules_in_force()
-        self._publish()
+        self._senses.publish(self.now)
         self._look_by(max(world.next_change(), self.now + self._timing.world_step / 2))
 
     def _put_rules_in_force(self) -> None:
         rules = self.world.rules()
         if self._rules is None or self._rules.rules != tuple(rules):
             self._rules = LinkRules(self.mission.seed, rules)
+            for member in self.members.values():
+                member.voice.unsettle(self.now)
             for link in self._links:
                 link.rule = self._rules.on(link.sender, link.hearer.name)
-        blind = {one.robot: (one.fault, one.delay) for one in self.world.blind()}
-        self._late |= self._blind.keys() - blind.keys()
-        self._blind = blind
-
-    def _publish(self) -> None:
-        if self.world.trial == 0 or self.world.over:
-            return
-        changed = [view for view in self._whole_view()[2] if self._is_new(view)]
-        if changed:
-            for name, member in self.members.items():
-                mine = [view for view in changed if view[0] in member.heard_on]
-                if mine:
-                    self._soon(self._sense, name, (self.world.trial, self.world.learning, mine))
-
-    def _is_new(self, view: tuple[str, bool, bool]) -> bool:
-        known = (self.world.trial, *view[1:])
-        if self._seen.get(view[0]) == known:
-            return False
-        self._seen[view[0]] = known
-        return True
-
-    def _whole_view(self) -> Senses:
-        views = [(task, *_applies(view)) for task, view in self.world.tasks().items()]
-        return self.world.trial, self.world.learning, views
-
-    def _sense(self, name: str, sensed: Senses, said_at: float | None = None) -> None:
-        """What the world says of tasks reaches a robot, unless it is blind; `said_at` is when, if it was held back."""
-        member = self.members[name]
-        if name in self._blind and said_at is None:
-            fault, delay = self._blind[name]
-            member.effects[fault, WORLD] += len(sensed[2])
-            if delay is None:
-                self._late.add(name)
-            else:
-                self._tardy.setdefault(name, {})
-                self._at(self.now + delay, 0, self._sense, name, sensed, self.now)
-            return
-        if member.process is Process.STOPPED:
-            self._late.add(name)
-        if name in self._tardy:
-            sensed = self._in_order(self._tardy[name], sensed, self.now if said_at is None else said_at)
-        member.sense(*sensed, self.now)
-
-    @staticmethod
-    def _in_order(known: dict[str, float], sensed: Senses, said_at: float) -> Senses:
-        """Without what has been overtaken: a robot drops what is older than what it knows."""
-        views = [view for view in sensed[2] if said_at >= known.get(view[0], 0.0)]
-        known.update((view[0], said_at) for view in views)
-        return sensed[0], sensed[1], views
-
-
-def _applies(view: TaskView) -> tuple[bool, bool]:
-    return view.applicable, view.complete
+        blind = self.world.blind()
+        self._senses.blind(blind)
+        self._disturbed = self._disturbed or bool(rules or blind)

@@ -12,7 +12,6 @@ import threading
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Literal, TypeVar, cast
 
 from lalliance_agents.bus.router import free_endpoint
@@ -25,6 +24,7 @@ from mission_control.chaos_client import ask
 from mission_control.keeper import LaunchError
 from mission_control.launch import Launcher, Plan
 from mission_control.picture import printable
+from mission_control.temporary import own_folder
 from world_server.world import TRIAL_PAUSE
 
 #: Real seconds that the start of all processes may take at most, and all that is not mission time at the mission's end.
@@ -114,10 +114,8 @@ class Real:
 
     async def _live(self) -> None:
         """Launch the mission; afterwards the loop goes on for the test, until it closes."""
-        with TemporaryDirectory(prefix="lalliance-", ignore_cleanup_errors=True) as folder:
-            await self._launch(
-                Plan.kept_in(Path(folder), self._path, self._mission, speed=self._speed, listen=self.endpoint)
-            )
+        with own_folder() as folder:
+            await self._launch(Plan.kept_in(folder, self._path, self._mission, speed=self._speed, listen=self.endpoint))
 
     async def _launch(self, plan: Plan) -> None:
         self._told_to_close = asyncio.Event()

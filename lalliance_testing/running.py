@@ -37,6 +37,7 @@ class RunningMission:
         self.speed = speed
         self._engine = engine
         self._excused: set[str] = set()
+        self._injected: dict[str, tuple[dict[str, Any], float | None]] = {}
         self._next = 0
         self._summary: dict[str, Any] | None = None
         self._judged = False
@@ -130,9 +131,22 @@ class RunningMission:
         if wrong is not None:
             raise UserError(f"{'.'.join(map(str, wrong[0]))}: {wrong[1]}")
         name = self._engine.inject(fault, spelled, lasts)
+        self._injected[name] = json.loads(spelled), lasts
         if may_not_fire:
             self._excused.add(name)
         return name
+
+    def injected(self) -> list[dict[str, Any]]:
+        """The faults that the test has injected so far, as a mission file would plan them."""
+        began, ended = (
+            {one.fault: one.at for one in self.events if one.kind == kind} for kind in ("fault", "fault_over")
+        )
+        planned = []
+        for name, (fields, lasts) in self._injected.items():
+            if name in began:
+                until = ended.get(name, None if lasts is None else began[name] + lasts)
+                planned.append(_planned(fields, began[name], until, self.mission))
+        return planned
 
     @blames_its_caller
     def heal(self, name: str = "") -> None:
@@ -212,6 +226,16 @@ class RunningMission:
     def close(self) -> None:
         """Have nothing left that runs."""
         self._engine.close()
+
+
+def _planned(fields: dict[str, Any], at: float, until: float | None, mission: Mission) -> dict[str, Any]:
+    """An injected fault in the fields of a mission file; what would last beyond the deadline has no end."""
+    times: dict[str, Any] = {"at": at}
+    if until is not None and at < until < mission.deadline:
+        times["until"] = until
+    if fields.get("kind") == "crash":
+        times["restart"] = "until" in times
+    return {**fields, **times}
 
 
 def _outcome(summary: dict[str, Any], mission: Mission) -> str:

@@ -1,5 +1,6 @@
 """What a failed test tells of a mission: its seed and how to repeat it, and what happened last."""
 
+import json
 import shlex
 from pathlib import Path
 
@@ -23,6 +24,9 @@ def tell(running: RunningMission, path: Path, nodeid: str) -> tuple[str, str]:
     command = f"lalliance {'run' if real else 'simulate'} {shlex.quote(str(path))} {options}"
     again = f"--lalliance-seed {mission.seed}" + (f" --lalliance-speed {running.speed:g}" if real else "")
     notes = [f"To repeat it: pytest {shlex.quote(nodeid)} {again}", f"The mission alone: {command}"]
+    if injected := running.injected():
+        notes.append("with the faults that the test injected, as lines of its faults:")
+        notes += [f"  - {json.dumps(fault)}" for fault in injected]
     silence = min(mission.parameters_of(robot).silence_timeout for robot in mission.robots) / running.speed
     if real and silence < SHORTEST_SILENCE:
         notes.append(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lalliance_agents.errors import UserError
+from mission_control.shell import ToldToEnd
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -74,8 +75,7 @@ def campaign(
     else:
         _show(document, console)
     if interrupted:
-        typer.echo("lalliance: interrupted", err=True)
-        raise typer.Exit(128 + signal.SIGINT)
+        raise ToldToEnd(signal.SIGINT)
     raise typer.Exit(1 if result.failures else 0)
 
 
@@ -91,7 +91,9 @@ def _examine_many(seed: int, missions: int, jobs: int | None) -> "tuple[Result, 
             for part in at_once(examine, parts, jobs):
                 total.add(part)
                 advance(part.missions, f"{len(total.failures)} failed" if total.failures else "")
-    except KeyboardInterrupt:
+    except ToldToEnd as asked:
+        if asked.number is not signal.SIGINT:
+            raise
         return total, True
     return total, False
 
@@ -123,7 +125,9 @@ def _tell_failures(
         if make_smaller and count < MOST_MADE_SMALL:
             try:
                 document = make_small(seed, failure)
-            except KeyboardInterrupt:
+            except ToldToEnd as asked:
+                if asked.number is not signal.SIGINT:
+                    raise
                 make_smaller = False
         told += _tell(seed, failure, _write(seed, failure, document, out), console)
     return told

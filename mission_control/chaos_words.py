@@ -96,7 +96,7 @@ def _length(value: Any) -> float:
             one_line(f"for: {short(str(value))} is not allowed; expected a number greater than 0, in seconds")
         )
     if value > LONGEST:
-        raise UserError(f"for: {value:g} is not allowed; expected a number of at most {LONGEST:g}")
+        raise UserError(f"for: {short(str(value))} is not allowed; expected a number of at most {LONGEST:g}")
     return float(value)
 
 

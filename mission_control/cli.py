@@ -13,7 +13,6 @@ import logging
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
@@ -23,7 +22,16 @@ import typer
 from lalliance_agents.errors import LallianceError, UserError
 from mission_control.campaign_command import campaign
 from mission_control.chaos import chaos
-from mission_control.shell import DEFAULT_ENDPOINT, AsJson, MissionPath, run_until_told
+from mission_control.shell import (
+    DEFAULT_ENDPOINT,
+    AsJson,
+    MissionPath,
+    ToldToEnd,
+    end_when_told,
+    run_until_told,
+    warn,
+    warn_of,
+)
 from mission_control.simulate import simulate
 from mission_control.study_command import study
 
@@ -94,6 +102,7 @@ def run(
 
     from mission_control.launch import Beginning, Launcher, Plan
     from mission_control.summary import show
+    from mission_control.yardstick import with_optimum
     from world_server.history import recall
 
     if connect is not None and listen is not None:
@@ -104,10 +113,9 @@ def run(
         from lalliance_agents.agent.catalog import prepare
 
         prepare(learned)
-    for warning in mission.warnings():
-        _warn(f"{path}: {warning}")
+    warn_of(path, mission)
     if (real := mission.parameters.silence_timeout / speed) < SHORTEST_SILENCE:
-        _warn(
+        warn(
             f"--speed {speed:g} makes {real:.2g} real seconds of silence a failure; a busy machine may see some that are none"
         )
 
@@ -122,6 +130,7 @@ def run(
 
     with _kept(journal) as kept:
         summary = run_until_told(launch(kept))
+    summary = with_optimum(summary, mission)
     if as_json:
         typer.echo(json.dumps(summary))
     else:
@@ -264,8 +273,7 @@ def check(path: MissionPath) -> None:
     from mission_control.summary import fault_lines
 
     mission = _load(path, None, part="team")
-    for warning in mission.warnings():
-        _warn(f"{path}: {warning}")
+    warn_of(path, mission)
     parts = {
         "robot": len(mission.robots),
         "task": len(mission.tasks),
@@ -312,14 +320,16 @@ def _kept(journal: Path | None) -> Iterator[Path]:
     if journal is not None:
         yield journal
         return
-    try:
-        folder = tempfile.TemporaryDirectory(prefix="lalliance-", ignore_cleanup_errors=True)
-    except OSError as error:
-        raise UserError(
-            f"no folder for temporary files ({error.strerror}); expected one that can be written to, or --journal FILE"
-        ) from error
-    with folder as name:
-        yield Path(name) / "journal"
+    from mission_control.temporary import own_folder
+
+    with contextlib.ExitStack() as open_until_then:
+        try:
+            folder = open_until_then.enter_context(own_folder())
+        except OSError as error:
+            raise UserError(
+                f"no folder for temporary files ({error.strerror}); expected one that can be written to, or --journal FILE"
+            ) from error
+        yield folder / "journal"
 
 
 def _view(mission: "Mission", console: "Console", *, plain: bool) -> "Lines":
@@ -347,10 +357,6 @@ def _show_events() -> None:
     events.propagate = False
 
 
-def _warn(text: str) -> None:
-    typer.echo(f"lalliance: warning: {text}", err=True)
-
-
 def _fail(text: str, status: int) -> NoReturn:
     typer.echo(f"lalliance: {' '.join(text.split())}", err=True)
     sys.exit(status)
@@ -360,13 +366,16 @@ def main() -> None:
     """Run the command line; errors become one sentence on standard error."""
     sys.path.insert(0, str(Path.cwd()))
     try:
+        end_when_told()
         app()
     except UserError as error:
         _fail(str(error), 2)
     except LallianceError as error:
         _fail(str(error), 1)
-    except KeyboardInterrupt:
-        _fail("interrupted", 128 + signal.SIGINT)
+    except ToldToEnd as told:
+        if told.number is signal.SIGINT:
+            typer.echo("lalliance: interrupted", err=True)
+        sys.exit(128 + told.number)
     except OSError as error:
         if error.errno not in {errno.EPIPE, errno.ENOSPC}:
             raise
@@ -374,3 +383,8 @@ def main() -> None:
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    finally:
+        # What is left to do must not take long; who is asked to end now ends at once.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.SIG_DFL)

@@ -2,17 +2,19 @@
 
 import json
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lalliance_agents.errors import UserError
-from mission_control.shell import AsJson, MissionPath
+from mission_control.shell import AsJson, MissionPath, warn_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from lalliance_agents.config import Mission
+    from lalliance_study.simulator import Simulator
 
 
 def simulate(
@@ -37,6 +39,7 @@ def simulate(
     mission = load(path, for_team=False)
     if seed is not None:
         mission = mission.model_copy(update={"seed": seed})
+    warn_of(path, mission)
     console = Console(stderr=as_json)
     found = (
         _once(mission, console, events=events, as_json=as_json) if runs == 1 else _often(mission, runs, jobs, console)
@@ -49,9 +52,11 @@ def simulate(
 def _once(mission: "Mission", console: "Console", *, events: bool, as_json: bool) -> Mapping[str, Any]:
     from lalliance_study.simulator import Simulator
     from mission_control.summary import show
+    from mission_control.yardstick import with_optimum
 
     simulator = Simulator(mission)
-    summary = simulator.run()
+    with _progress(simulator):
+        summary = with_optimum(simulator.run(), mission)
     if not as_json:
         for line in simulator.log if events else ():
             typer.echo(str(line))
@@ -59,9 +64,27 @@ def _once(mission: "Mission", console: "Console", *, events: bool, as_json: bool
     return {**summary, "events": [line._asdict() for line in simulator.log]} if events else summary
 
 
+def _progress(simulator: "Simulator") -> AbstractContextManager[object]:
+    """How far a mission is in virtual time, on standard error, if that is a terminal."""
+    from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
+
+    def reached() -> Text:
+        world = simulator.world
+        trial = f"trial {world.trial} of {world.trials_planned}, " if world.trials_planned > 1 else ""
+        return Text(f"{world.mission.name}: {trial}{world.elapsed:,.0f} s of at most {world.mission.deadline:,.0f} s")
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        return nullcontext()
+    return Live(get_renderable=reached, console=console, refresh_per_second=5, transient=True)
+
+
 def _often(mission: "Mission", runs: int, jobs: int | None, console: "Console") -> Mapping[str, Any]:
     from lalliance_study.pool import at_once, progress
     from lalliance_study.runs import overview, simulate_seeds
+    from mission_control.yardstick import with_optimum
 
     parts = [
         range(first, min(first + PART, mission.seed + runs)) for first in range(mission.seed, mission.seed + runs, PART)
@@ -71,7 +94,7 @@ def _often(mission: "Mission", runs: int, jobs: int | None, console: "Console") 
         for part in at_once(simulate_seeds, [(mission, part) for part in parts], jobs):
             found += part
             advance(len(part), "")
-    document = overview(mission, sorted(found))
+    document = with_optimum(overview(mission, sorted(found)), mission)
     if not console.stderr:
         _show(document, mission, console)
     return document
@@ -95,6 +118,9 @@ def _show(document: Mapping[str, Any], mission: "Mission", console: "Console") -
     if document["makespan"]:
         spread = ", ".join(f"{name} {value:.1f} s" for name, value in document["makespan"].items())
         console.print(f"Makespan: {spread}", highlight=False)
+    if document["ratio"] is not None:
+        told = f"the mean is {document['ratio']:.2f} times the optimum of {document['optimum']:.1f} s"
+        console.print(f"Optimum: {told}", highlight=False)
     takeovers = ", ".join(f"{count} {cause}" for cause, count in document["takeovers"].items()) or "none"
     console.print(f"Takeovers: {takeovers}", highlight=False)
     for fault, fired in zip(mission.faults, document["faults"], strict=True):

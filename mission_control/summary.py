@@ -9,6 +9,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from lalliance_agents.bus.drops import CUT_OFF
 from lalliance_agents.faults import Fault, describe
 
 #: Faults that are shown one by one: the latest.
@@ -30,9 +31,10 @@ def _parts(summary: Mapping[str, Any]) -> Iterator[RenderableType]:
 
 def _headline(summary: Mapping[str, Any]) -> Text:
     if summary["complete"]:
-        return Text(
-            f"\nMission {summary['mission']} complete: makespan {summary['makespan']:.1f} s", style="bold green"
-        )
+        told = f"\nMission {summary['mission']} complete: makespan {summary['makespan']:.1f} s"
+        if summary.get("ratio") is not None:
+            told += f", {summary['ratio']:.2f} times the optimum of {summary['optimum']:.1f} s"
+        return Text(told, style="bold green")
     return Text(f"\nMission {summary['mission']} not complete", style="bold red")
 
 
@@ -153,6 +155,13 @@ def _notes(summary: Mapping[str, Any]) -> Iterator[Text]:
     messages, control = summary["messages"], summary["control"]
     dropped = ", ".join(f"{count} {reason}" for reason, count in messages["dropped"].items()) or "none"
     yield Text(f"Messages: {messages['sent']} sent, {messages['received']} received, dropped: {dropped}")
+    for drop in messages["drops"]:
+        if drop["reason"] == CUT_OFF:
+            yield Text(
+                f"{drop['of']} was cut off at {drop['at']}: {drop['count']} messages, older than one that was made up or that "
+                "another process of this name sent",
+                "yellow",
+            )
     yield Text(f"Control periods: {control['periods']} kept, {control['missed']} missed")
     # A robot that hung has missed its periods whatever the machine.
     hung = any(fault["kind"] == "hang" and fault["fired"] for fault in summary["faults"])

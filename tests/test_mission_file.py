@@ -15,7 +15,15 @@ from pydantic import Field, ValidationError
 
 from lalliance_agents.config import Mission, misplaced
 from lalliance_agents.errors import MissionError
-from lalliance_agents.mission_file import LARGEST, MissionText, load_mission, load_mission_text, parse_mission
+from lalliance_agents.faults import RadioFault
+from lalliance_agents.mission_file import (
+    LARGEST,
+    MissionText,
+    load_mission,
+    load_mission_text,
+    parse_mission,
+    read_fault,
+)
 from lalliance_agents.model.parameters import Learning, Ordering, Positive, Record, Strategy
 
 DEPOT = """\
@@ -265,6 +273,19 @@ ADDED = {
     "faults: [{at: 3, link: {}, delay: {unifrm: [1, 2]}}]": "faults.0.delay.unifrm: unknown field; did you mean 'uniform'?",
     "faults: [{at: 3, link: {}, loss: 0.5}, {at: 5, link: {to: r2}, loss: 0.3}]": "faults.1: another rule sets loss from r1 "
     "to r2 at the same time; expected one of them (see faults.0)",
+    "faults: [{at: 3, link: {from: r1, to: r1}, loss: 0.5}]": "faults.0.link: r1 is the only robot at both ends, and none "
+    "hears itself; expected two different robots",
+    "faults: [{at: 3, link: {from: '*1', to: [r1, '?1'], both: true}, cut: true}]": "faults.0.link: r1 is the only robot at "
+    "both ends, and none hears itself; expected two different robots",
+    "faults: [{at: 3, link: {from: []}, loss: 0.5}]": "faults.0.link.from: [] is not allowed; expected 1 or more entries",
+    "faults: [{at: 3, link: {from: [r1, 5]}, loss: 0.5}]": "faults.0.link.from.1: 5 is a number; expected text, in quotes: "
+    "'5'",
+    "faults: [{at: 3, link: {from: 5}, loss: 0.5}]": "faults.0.link.from: 5 is a number; expected a list or text, in quotes: "
+    "'5'",
+    "faults: [{at: 3, partition: [[], []]}]": "faults.0.partition.0: [] is not allowed; expected 1 or more entries "
+    "(and 1 more)",
+    "faults: [{at: 3, link: {}, delay: {uniform: [1.0000001, 1]}}]": "faults.0.delay.uniform: the second number 1 s is "
+    "below the first one 1.0000001 s",
     "faults: [{at: 3, partition: [r1]}]": "faults.0.partition: ['r1'] is not allowed; expected 2 or more entries",
     "faults: [{at: 3, partition: [r1, [r2, 'r*']]}]": "faults.0.partition.1: r1 is in two groups of the partition; expected "
     "it in one",
@@ -292,9 +313,56 @@ def test_the_first_error_by_line_is_told_and_the_others_are_counted() -> None:
     )
 
 
-def test_a_fault_of_a_robot_that_has_not_joined() -> None:
-    text = DEPOT.replace("{b: 9}", "{b: 9}, joins: 5") + "faults: [{kind: crash, robot: r2, at: 4}]"
-    assert sentence(text) == ("x.yaml:7: faults.0.at: at 4 s robot r2 is not there; expected not before it joins, 5 s")
+@pytest.mark.parametrize("at", ["4", "4.9999999999"])
+def test_a_fault_of_a_robot_that_has_not_joined(at: str) -> None:
+    text = DEPOT.replace("{b: 9}", "{b: 9}, joins: 5") + f"faults: [{{kind: crash, robot: r2, at: {at}}}]"
+    assert (
+        sentence(text) == f"x.yaml:7: faults.0.at: at {at} s robot r2 is not there; expected not before it joins, 5 s"
+    )
+
+
+NEVER_DONE = {
+    "{at: 3, robot: r1, kind: crash}": ["tasks.a: no robot is left for it after crash of r1 at 3 s; if it"],
+    "{at: 3, robot: r1, kind: hang}": ["tasks.a: no robot is left for it after hang of r1 at 3 s; if it"],
+    "{at: 3, until: 5, robot: r1, kind: hang}": [],
+    "{at: 3, robot: r1, kind: crash, restart: true}": [],
+    "{at: 3, robot: r1, kind: stuck, task: b}": [],
+    "{at: 3, robot: r1, kind: blind, delay: 1}": [],
+    "{at: 3, robot: r2, kind: crash}": [],
+    "{at: 3, robot: r1, kind: blind}, {at: 2, robot: r1, kind: stuck}, {at: 4, robot: r2, kind: stuck, task: b}": [
+        "tasks.a: no robot is left for it after stuck of r1 at 2 s; if it",
+        "tasks.b: no robot is left for it after stuck of r1 at 2 s and stuck of r2 at b at 4 s; if it",
+    ],
+}
+
+
+@pytest.mark.parametrize("faults", NEVER_DONE)
+def test_a_task_that_faults_leave_no_robot_for_is_warned_of(faults: str) -> None:
+    mission = parse_mission(f"{DEPOT}parameters: {{max_delay: 0.3}}\nfaults: [{faults}]", "x.yaml")
+    assert [warning[: warning.index("; if it") + 7] for warning in mission.warnings()] == NEVER_DONE[faults]
+
+
+def test_a_task_without_a_robot_before_the_last_trial_is_warned_of() -> None:
+    text = DEPOT.replace("tasks: {a: 8, b: 4}", "tasks: {a: 8, b: 4}\n    joins: 3") + "parameters: {max_delay: 0.3}\n"
+    assert parse_mission(text, "x.yaml").warnings() == []
+    trained = parse_mission(text + "phases: [{learning: active}, {}]", "x.yaml")
+    assert trained.warnings() == ["tasks.a: its robots join in the last trial; those before it cannot complete"]
+
+
+def test_a_lone_robot_has_no_links() -> None:
+    text = "name: x\ntasks: {a: }\nrobots: {r1: {tasks: {a: 1}}}\nfaults: [{at: 3, link: {}, loss: 0.5}]"
+    assert sentence(text).startswith("x.yaml:4: faults.0.link: r1 is the only robot at both ends")
+    pairs = ("{from: r1, to: 'r*'}", "{from: 'r*', to: r2}", "{}")
+    for pair in pairs:
+        parse_mission(DEPOT + f"faults: [{{at: 3, link: {pair}, loss: 0.5}}]", "x.yaml")
+
+
+@pytest.mark.parametrize(("spelled", "shown"), [("1e999", ".inf"), ("-1e999", "-.inf"), ("NaN", ".nan")])
+def test_a_fault_in_json_with_a_number_that_is_not_finite(spelled: str, shown: str) -> None:
+    with pytest.raises(MissionError) as caught:
+        read_fault(f'{{"kind": "slow", "robot": "NaN", "factor": {spelled}}}')
+    assert str(caught.value) == f"factor: {shown} is not allowed; expected a finite number"
+    assert read_fault('{"kind": "mute", "robot": "-Infinity"}') == RadioFault(at=0, kind="mute", robot="-Infinity")
 
 
 def test_aliases_that_unfold_without_end_are_refused() -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from lalliance_agents.bus.base import Sample
+from lalliance_agents.bus.drops import CUT_OFF
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.errors import MessageError, UserError
 from lalliance_agents.wire.keys import OPERATOR
@@ -54,10 +55,15 @@ class ChaosDesk:
         now = self._clock()
         if command.verb == "status":
             self._history.advance(now)
-            return f"{self._world.stage} at {self._world.elapsed:.1f} s"
+            return f"{self._world.stage} at {self._world.elapsed:.1f} s{self._cut_off()}"
         if command.verb == "inject" and len(self._world.failures.entries) >= MOST_FAULTS:
             raise UserError(f"this mission has had {MOST_FAULTS} faults; expected no more than that")
         return self._history.obey(command, now)
+
+    def _cut_off(self) -> str:
+        """Of whom nothing is used any more, and by whom; empty: of nobody."""
+        pairs = [f"{one['of']} at {one['at']}" for one in self._world.ledger.drops() if one["reason"] == CUT_OFF]
+        return f"; cut off: {', '.join(pairs)}" if pairs else ""
 
     def _reply(self, ask: Sample, *, done: bool, text: str) -> list[Sample]:
         self._settle()

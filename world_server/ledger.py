@@ -8,11 +8,12 @@ often a robot says something, what is kept of it is limited: the latest attempts
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from lalliance_agents.wire.keys import WORLD
 from lalliance_agents.wire.messages import DecisionMade, Effect, LinkReport
 
 _TAKEOVERS = {"silence", "impatience", "released"}
@@ -24,6 +25,10 @@ MOST_LETTERS = 40
 #: Reasons of drops that are told apart; those of a robot that makes up more count as `OTHER_REASONS`.
 MOST_REASONS = 100
 OTHER_REASONS = "others"
+#: How an attempt ended with which its task was completed.
+COMPLETE = "complete"
+#: Of drops by hearer, sender and reason, those told apart; more are not kept.
+MOST_DROPS = 1000
 
 
 @dataclass(slots=True)
@@ -33,6 +38,8 @@ class _Counts:
     sent: int = 0
     received: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
+    drops: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+    """By hearer, sender and reason."""
     ticks: int = 0
     missed: int = 0
 
@@ -44,6 +51,10 @@ class _Counts:
         for reason, count in report.dropped.items():
             known = reason in self.dropped or len(self.dropped) < MOST_REASONS
             self.dropped[reason if known else OTHER_REASONS] += count
+        for drop in report.drops:
+            row = report.sender, drop.sender, drop.reason
+            if row in self.drops or len(self.drops) < MOST_DROPS:
+                self.drops[row] += drop.count
 
 
 @dataclass(slots=True)
@@ -51,7 +62,7 @@ class _Attempt:
     robot: str
     at: float
     ended: str | None = None
-    """The cause that the robot gave for its end, or `lost` if the robot was."""
+    """`complete` if the task was completed meanwhile, `lost` if the robot was; else the cause that it gave for its end."""
 
 
 @dataclass(slots=True)
@@ -74,6 +85,8 @@ class Ledger:
         self._takeovers: deque[dict[str, Any]] = deque(maxlen=MOST_KEPT)
         self._links: dict[str, LinkReport] = {}
         self._earlier_lives = _Counts()
+        #: What the world's own server could not use, by sender and reason.
+        self.dropped_here: Mapping[tuple[str, str], int] = {}
         self.trials: list[float] = []
 
     def new_trial(self) -> None:
@@ -88,9 +101,11 @@ class Ledger:
             self._tasks[task].attempts.append(_Attempt(robot, at))
 
     def completed(self, task: str, by: tuple[str, ...], at: float) -> None:
-        """`task` was finished by `by`."""
-        self._tasks[task].completed_at = at
-        self._tasks[task].by = by
+        """`task` was finished by `by`; that ends all attempts at it."""
+        record = self._tasks[task]
+        record.completed_at, record.by = at, by
+        for attempt in record.attempts:
+            attempt.ended = attempt.ended or COMPLETE
 
     def failed(self, robot: str, at: float) -> None:
         """`robot` ceased to be."""
@@ -159,11 +174,22 @@ class Ledger:
         """When the last task was completed, if any was."""
         return max((one.completed_at for one in self._tasks.values() if one.completed_at is not None), default=None)
 
-    def summary(self) -> dict[str, Any]:
-        """Tasks, takeovers, messages and control periods, as plain data."""
+    def _counts(self) -> _Counts:
+        """The sums over all robots and their lives."""
         counts = deepcopy(self._earlier_lives)
         for report in self._links.values():
             counts.add(report)
+        return counts
+
+    def drops(self) -> list[dict[str, Any]]:
+        """Who did not use how many messages of whom, and why: robots, and the world's server."""
+        rows = sorted(self._counts().drops.items())
+        rows += sorted(((WORLD, of, reason), count) for (of, reason), count in self.dropped_here.items())
+        return [{"at": at, "of": of, "reason": reason, "count": count} for (at, of, reason), count in rows]
+
+    def summary(self) -> dict[str, Any]:
+        """Tasks, takeovers, messages and control periods, as plain data."""
+        counts = self._counts()
         return {
             "tasks": {
                 task: {
@@ -178,6 +204,7 @@ class Ledger:
                 "sent": counts.sent,
                 "received": counts.received,
                 "dropped": dict(sorted(counts.dropped.items())),
+                "drops": self.drops(),
             },
             "control": {"periods": counts.ticks, "missed": counts.missed},
         }

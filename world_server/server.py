@@ -84,7 +84,8 @@ class WorldServer:
         self._all_back = asyncio.Event()
         if journal is not None:
             incarnation = journal.next_incarnation(incarnation)
-        self._messenger = Messenger(bus, self._keys, WORLD, incarnation, self._now)
+        self._messenger = Messenger(bus, self._keys, WORLD, incarnation, self._now, mission.robots)
+        self._world.ledger.dropped_here = self._messenger.dropped_of
         self._desk = ChaosDesk(self._history, self._messenger, self._now, self._settle)
         self._told_rules: dict[str, Any] = {}
         self._published: dict[str, tuple[int, TaskView]] = {}

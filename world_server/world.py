@@ -75,6 +75,7 @@ class World:
         self._now = now
         self._began = now
         self._pause_until: float | None = None
+        self._undisturbed = {task: Work(task) for task in mission.tasks}
         self._phases = [phase for phase in mission.phases for _ in range(phase.trials)]
         self._phase: Phase = self._phases[0]
         self._environment = self._fresh_environment()
@@ -314,7 +315,7 @@ class World:
     def _actions(self) -> dict[str, Work]:
         working = self.bodies.working()
         if not (self.live and self.failures.hold_up):
-            return {robot: Work(task) for robot, task in working.items()}
+            return {robot: self._undisturbed[task] for robot, task in working.items()}
         return {
             robot: Work(task, self.failures.pace(robot, task))
             for robot, task in working.items()

@@ -8,7 +8,10 @@ from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.model.hearing import Presence
 from lalliance_agents.model.mind import Mind
 from lalliance_agents.wire.keys import Kind
-from lalliance_agents.wire.messages import Reception
+from lalliance_agents.wire.messages import Drop, Reception
+
+#: Pairs of sender and reason of which a report tells how many messages were dropped: those with the most.
+MOST_DROPS = 32
 
 
 class Reports:
@@ -47,6 +50,7 @@ class Reports:
             sent=self._messenger.sent,
             received=self._messenger.received,
             dropped=dict(self._messenger.dropped + self._bus.dropped),
+            drops=self._drops(),
             teammates={
                 robot: _reception(count, mind.hearing.presences.get(robot), silences.get(robot), now)
                 for robot, count in self._received.items()
@@ -56,6 +60,10 @@ class Reports:
             missed=self._missed,
             final=final,
         )
+
+    def _drops(self) -> list[Drop]:
+        dropped = (self._messenger.dropped_of + self._bus.dropped_of).most_common(MOST_DROPS)
+        return [Drop(sender=sender, reason=reason, count=count) for (sender, reason), count in dropped]
 
     def motivations(self, mind: Mind) -> bytes:
         """The packed message with all motivations and their factors."""

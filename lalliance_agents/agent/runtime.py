@@ -91,7 +91,7 @@ class Robot:
         self.mind = new_mind(mission, name, self._chance, now=now, learned=catalog.learned if catalog else None)
         self._keys = Keys(mission.name)
         self._bus = FaultyBus(bus, self._keys, name, self._clock)
-        self._messenger = Messenger(self._bus, self._keys, name, incarnation, self._clock.now)
+        self._messenger = Messenger(self._bus, self._keys, name, incarnation, self._clock.now, mission.robots)
         self._reports = Reports(self._messenger, self._bus)
         self._team = Team(name, frozenset(tasks), MOST_TEAMMATES)
         for teammate in mission.teammates(name):

@@ -19,6 +19,7 @@ from collections import Counter
 
 from lalliance_agents.bus.base import Answer, Bus, Delivery, Handler, PresenceHandler, Publication, Registration, Sample
 from lalliance_agents.bus.delay_line import DelayLine
+from lalliance_agents.bus.drops import OTHERS
 from lalliance_agents.bus.inbox import Inlet
 from lalliance_agents.bus.link import LinkRules, RuledLink
 from lalliance_agents.bus.messenger import Messenger
@@ -38,7 +39,6 @@ TOO_MANY = "late overflow"
 MOST_KEYS = 2**14
 #: Pairs of fault and sender told apart at most, so that a report stays small; more count as those of `OTHERS`.
 MOST_EFFECTS = 128
-OTHERS = "@others"
 
 _Treatment = tuple[Key, RuledLink | Blindness]
 
@@ -76,6 +76,11 @@ class FaultyBus(Bus):
     def dropped(self) -> Counter[str]:
         """Messages not handed on, by reason."""
         return self._ear.dropped
+
+    @property
+    def dropped_of(self) -> Counter[tuple[str, str]]:
+        """Messages on `@chaos/rules` not heeded, by sender and reason."""
+        return self._ear.dropped_of
 
     def effects(self) -> list[Effect]:
         """How many messages each fault touched so far, by sender."""

@@ -1,8 +1,9 @@
 """One participant's messages on a bus: a header on each that leaves, a check of each that comes.
 
 What leaves is numbered and stamped. What comes is dropped if it does not decode, if somebody speaks for another, or if it is
-no news; every drop is counted by its reason and logged once per key's owner and reason, as far as the limit of such lines. No
-message can raise an error here: a receiver that fails has lost the one message, and the first such failure is logged.
+no news; every drop is counted, and told as far as that does not fill the log (`drops`). No message can raise an error here: a
+receiver that fails has lost the one message. If nothing of a sender is news for a while although it goes on talking, that is
+told and counted as well: one made-up message can do that.
 
 Presence (activity and heartbeats) has numbers of its own, 1, 2, 3, …, and all other kinds share another row. What a link rule
 does to a message follows from its number, so a simulated robot that announces the same must count the same, whatever else the
@@ -12,12 +13,13 @@ real one sends. Each key's stream takes its numbers from one row only, in the or
 import itertools
 import logging
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from lalliance_agents.bus.base import Bus, Delivery, Registration, Sample
+from lalliance_agents.bus.drops import CUT_OFF, Drops
 from lalliance_agents.errors import MessageError
-from lalliance_agents.wire.freshness import Freshness
+from lalliance_agents.wire.freshness import Freshness, Newest
 from lalliance_agents.wire.keys import PRESENCE, Key, Keys, Kind
 from lalliance_agents.wire.messages import BODY_OF, Message, decode_at, encode
 
@@ -30,11 +32,9 @@ _DELIVERY = {
     Kind.LINK: Delivery.TELEMETRY,
 }
 
-#: Lines about dropped messages at most: whoever makes up names cannot fill the log, nor the memory of what was logged.
-MOST_LINES = 1000
-
-#: Reasons for which messages are dropped in good order; they are counted and not logged.
-EXPECTED = {"stale", "other trial"}
+#: A sender is cut off when so many of its messages in a row were no news, for at least so many seconds of mission time.
+CUT_OFF_AFTER = 10
+CUT_OFF_SECONDS = 10.0
 
 Receiver = Callable[[Key, Message], None]
 
@@ -48,22 +48,34 @@ class Messenger:
         me: the name that goes into each header.
         incarnation: which life of `me` this is.
         clock: gives mission time, in seconds.
+        team: the robots that are told apart in the account of what was dropped.
     """
 
-    def __init__(self, bus: Bus, keys: Keys, me: str, incarnation: int, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, bus: Bus, keys: Keys, me: str, incarnation: int, clock: Callable[[], float], team: Iterable[str] = ()
+    ) -> None:
         self.bus = bus
         self.keys = keys
         self.me = me
         self.incarnation = incarnation
         self.sent = 0
         self.received = 0
-        self.dropped: Counter[str] = Counter()
+        self._drops = Drops(team)
         self._clock = clock
         self._presence_numbers = itertools.count(1)
         self._other_numbers = itertools.count(1)
         self._freshness = Freshness()
-        self._logged: set[tuple[str, str]] = set()
         self._registrations: list[Registration] = []
+
+    @property
+    def dropped(self) -> Counter[str]:
+        """Messages that were not used, by reason."""
+        return self._drops.by_reason
+
+    @property
+    def dropped_of(self) -> Counter[tuple[str, str]]:
+        """The same by sender and reason; see `Drops`."""
+        return self._drops.by_sender
 
     def compose(self, kind: Kind, /, **fields: Any) -> bytes:
         """The packed message of `kind` with the next number of its row."""
@@ -116,29 +128,43 @@ class Messenger:
         except MessageError as error:
             self.drop(error.reason, source, str(error))
             return
-        if not self._freshness.admit(key.stream, message.incarnation, message.seq):
-            self.drop("stale", source)
+        newest = self._freshness.overtaken(key.stream, message.incarnation, message.seq, self._clock())
+        if newest is not None:
+            self._drop_stale(source, sample.key, newest)
             return
         self.received += 1
         try:
             receiver(key, message)
         except Exception:
-            if self._is_first("receiver", source):
+            if self._drops.add("receiver", source):
                 _log.exception("a message of %s could not be used: its receiver failed", source)
-            self.dropped["receiver"] += 1
 
     def drop(self, reason: str, source: str, detail: str = "") -> None:
-        """Count a message that is not used, and log the first of its source and reason."""
-        self.dropped[reason] += 1
-        if reason not in EXPECTED and self._is_first(reason, source):
-            _log.warning("dropping messages of %s: %s", source, detail or reason)
+        """Count a message that is not used; tell it if its reason is new, or the number of such messages."""
+        if self._drops.add(reason, source):
+            count = self.dropped[reason]
+            more = f" ({count} dropped for this reason so far)" if count > 1 else ""
+            _log.warning("dropping messages of %s: %s%s", source, detail or reason, more)
 
-    def _is_first(self, reason: str, source: str) -> bool:
-        """Whether this is the first time, so far as it can be told, and is to be logged."""
-        if (source, reason) in self._logged or len(self._logged) >= MOST_LINES:
-            return False
-        self._logged.add((source, reason))
-        return True
+    def _drop_stale(self, source: str, key: str, newest: Newest) -> None:
+        """Count a message that is no news; tell it if nothing has been for a while."""
+        lasts = self._clock() - newest.at
+        if newest.stale < CUT_OFF_AFTER or lasts < CUT_OFF_SECONDS:
+            self.drop("stale", source)
+            return
+        self.drop(CUT_OFF, source)
+        if not newest.told:
+            newest.told = True
+            if self._drops.is_cut_off(source):
+                _log.warning(
+                    "%s is cut off: for %.0f s nothing on %s is newer than its message %d of life %d, which somebody made up, "
+                    "unless another process goes by this name or messages come very late; none of them is used",
+                    source,
+                    lasts,
+                    key,
+                    newest.seq,
+                    newest.incarnation,
+                )
 
     async def close(self) -> None:
         """Stop listening and answering."""

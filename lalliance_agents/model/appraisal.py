@@ -46,7 +46,8 @@ class Appraisal:
         self._hearing = hearing
         self._learns = parameters.architecture is Architecture.L_ALLIANCE
         literal = parameters.is_literal
-        self._influence_on_active = literal(Erratum.INFLUENCE_ON_ACTIVE)
+        #: Whether a robot goes on comparing itself with others while it works (erratum 6, literal).
+        self.influence_on_active = literal(Erratum.INFLUENCE_ON_ACTIVE)
         self._reset_on_active = literal(Erratum.RESET_ON_ACTIVE)
         self._slowest_of_all = literal(Erratum.SLOWEST_OF_WHOM)
         self._learning_looks_back = literal(Erratum.LEARNING_WINDOW)
@@ -250,6 +251,6 @@ class Appraisal:
         return equations.impatience_reset(self._hearing.any_news(one.task, moment.before, moment.now))
 
     def _influence(self, one: Motivation, moment: Moment, category: int) -> int:
-        if not self._learns or (one.active_since is not None and not self._influence_on_active):
+        if not self._learns or (one.active_since is not None and not self.influence_on_active):
             return 1
         return equations.learned_robot_influence(moment.boredom, self._parameters.boredom_threshold, category)

@@ -13,7 +13,7 @@ from lalliance_agents.model.equations import in_window
 from lalliance_agents.model.parameters import EARLY
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Contact:
     """One teammate heard on one task during this trial. Instants are the hearer's own."""
 
@@ -114,6 +114,13 @@ class Hearing:
         contact.expected = expected
         self.presences[robot].contact = contact
 
+    def watch(self, task: str, *, on: bool) -> None:
+        """From now on it matters who ceases to be heard on `task`, or, as the task is complete, does not."""
+        contacts = self.contacts(task)
+        self._lasting = [contact for contact in self._lasting if contact not in contacts]
+        if on:
+            self._lasting += [contact for contact in contacts if contact.lapsed_at is None]
+
     def has_heard(self, robots: frozenset[str]) -> bool:
         """Whether each of `robots` was heard in this trial."""
         return robots <= self.presences.keys()
@@ -168,14 +175,15 @@ class Hearing:
             return False
         return any(self.is_news(contact, before, now) for contact in self.contacts(task))
 
-    def note_checked(self) -> bool:
-        """All that was heard so far has been counted: it is no news to the next step. Whether there was any news."""
+    def note_checked(self, until: float = math.inf) -> bool:
+        """All that was first heard up to `until` has been counted: it is no news to the next step. Whether any was."""
         if not self._news:
             return False
-        for contact in self._news:
+        counted = [contact for contact in self._news if self.beginning(contact) <= until]
+        for contact in counted:
             contact.noticed = True
-        self._news.clear()
-        return True
+        self._news = [contact for contact in self._news if not contact.noticed]
+        return bool(counted)
 
     def beginning(self, contact: Contact) -> float:
         """The instant with which first-heard windows begin (erratum 16)."""
@@ -196,14 +204,20 @@ class Hearing:
                 contact.lapsed_at = now
         self._lasting = [contact for contact in self._lasting if contact.lapsed_at is None]
 
-    def next_lapse(self) -> float:
-        """The earliest instant at which a step may find that somebody has ceased to be heard, there or on a task."""
+    def next_lapse(self, heeded: Collection[str] = ()) -> float:
+        """The earliest instant at which a step may find that somebody has ceased to be heard, there or on a task.
+
+        Args:
+            heeded: teammates that are known to go on with what they said last.
+        """
         last = math.inf
-        for presence in self.presences.values():
-            if presence.last < last and not presence.absent:
+        for robot, presence in self.presences.items():
+            if presence.last < last and not presence.absent and robot not in heeded:
                 last = presence.last
         for contact in self._lasting:
-            if contact.last < last:  # noqa: PLR1730 - this is asked for at every step, and `min` costs thrice as much
+            if contact.last < last and not (
+                contact.robot in heeded and self.presences[contact.robot].contact is contact
+            ):
                 last = contact.last
         return last + self._tau - EARLY
 

@@ -99,6 +99,10 @@ class Knowledge:
         self._read()
         return self._knows_teammates or self._undefined_if_unknown
 
+    def settles_at(self) -> float:
+        """The instant after which some monitor has an attempt to judge; see `Monitor.settles_at`."""
+        return min((monitor.settles_at() for monitor in self.monitors.values()), default=math.inf)
+
     def fewest(self, teammates: Mapping[str, frozenset[str]]) -> int:
         """The smallest number of samples kept of any robot for a task it shares with this one, itself included.
 

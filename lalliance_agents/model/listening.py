@@ -6,12 +6,24 @@ that it costs next to nothing, and leaves alone all that was foreseen of the ste
 
 import math
 from collections.abc import Mapping
+from enum import Enum, auto
 
 from lalliance_agents.model.events import Heard
 from lalliance_agents.model.hearing import Hearing, Presence
 from lalliance_agents.model.knowledge import Knowledge
 from lalliance_agents.model.monitor import Attempt
 from lalliance_agents.model.motivation import Motivation
+
+
+class News(Enum):
+    """What a message tells."""
+
+    NONE = auto()
+    """Nothing, or what the message before it told: a refresh."""
+    ELSEWHERE = auto()
+    """That a teammate known to be present is on none of this robot's tasks; whom it may have left is not silent yet."""
+    SOME = auto()
+    """Anything else."""
 
 
 class Listener:
@@ -34,8 +46,8 @@ class Listener:
         """Whether what is heard at `now` only goes on with what was heard before (see `Mind.is_refresh`)."""
         return self._continued(event, now) is not None
 
-    def hear(self, event: Heard, now: float) -> bool:
-        """Take in a message; whether it told anything new."""
+    def hear(self, event: Heard, now: float) -> News:
+        """Take in a message; what it told."""
         going_on = self._continued(event, now)
         if going_on is not None:
             presence, attempt = going_on
@@ -44,11 +56,13 @@ class Listener:
                 presence.contact.last = now
             if attempt is not None:
                 attempt.last, attempt.active_for = now, event.active_for
-            return False
+            return News.NONE
         if event.robot == self._me:
-            return False
+            return News.NONE
+        known = self._hearing.presences.get(event.robot)
+        told = News.ELSEWHERE if known and not known.absent and event.task not in self._sets else News.SOME
         self._take_in(event, now)
-        return True
+        return told
 
     def _continued(self, event: Heard, now: float) -> tuple[Presence, Attempt | None] | None:
         """What a refresh goes on with; None if it is no refresh."""

@@ -12,7 +12,7 @@ the mind decides and says is then the same, to the last bit.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from lalliance_agents.model import equations
 from lalliance_agents.model.appraisal import Appraisal, Moment
@@ -35,7 +35,7 @@ from lalliance_agents.model.events import (
 )
 from lalliance_agents.model.hearing import Hearing
 from lalliance_agents.model.knowledge import Knowledge
-from lalliance_agents.model.listening import Listener
+from lalliance_agents.model.listening import Listener, News
 from lalliance_agents.model.motivation import Motivation
 from lalliance_agents.model.outlook import AT_ONCE, Outlook
 from lalliance_agents.model.parameters import EARLY, SLACK, Architecture, Erratum, Learning, Parameters
@@ -99,16 +99,18 @@ class Mind:
         return f"<Mind {self.me}: {', '.join(self.active) or 'idle'}, {len(self._sets)} sets>"
 
     def _begin_trial(self, learning: Learning, now: float) -> None:
-        self._learning = learning
-        self._born = now
-        self._waiting = self._beats
-        self._idle_since = now
         for one in self._sets.values():
             if one.active:
+                factors = self._appraise(one, self._moment_at(now, self._before, self.active), suppressed=False)
+                one.factors = factors.having(one.value(now))
                 self._pending.append(Deactivate(self._stop(one, now, Cause.NEW_TRIAL, None)))
             self._sets[one.task] = Motivation(one.task, self._draw(), since=now)
             self.knowledge.monitors[one.task].new_trial()
         self.hearing.forget()
+        self._learning = learning
+        self._born = now
+        self._waiting = self._beats
+        self._idle_since = now
 
     @property
     def active(self) -> list[str]:
@@ -116,34 +118,55 @@ class Mind:
         return [task for task, one in self._sets.items() if one.active_since is not None]
 
     def factors(self) -> dict[str, Factors]:
-        """What produced each motivation at the last tick; of sets that another one suppressed, looked up only now."""
+        """What produced each motivation at the last tick; of sets that could not but be 0, looked up only now."""
         if self._moment is None:
             return {}
+        busy = bool(self.active)
         return {
-            task: one.factors or self._appraise(one, self._moment, suppressed=True) for task, one in self._sets.items()
+            task: one.factors or self._appraise(one, self._moment, suppressed=busy) for task, one in self._sets.items()
         }
 
     def handle(self, event: Event, now: float) -> None:
-        """Take in what was perceived at `now`; what follows from it is decided at the next tick.
-
-        Anything but a refresh (`is_refresh`) makes that the very next step of the driver's grid.
-        """
+        """Take in what was perceived at `now`; what follows from it is decided at the next tick."""
+        learned = self.knowledge.version
         match event:
             case Heard():
-                if self._listener.hear(event, now):
-                    self._wake = AT_ONCE
-                return
+                told = self._listener.hear(event, now)
+                if told is not News.NONE:
+                    may_matter = told is News.SOME and self._task_alone() is None
+                    self._heed(may_matter or self.knowledge.version != learned)
             case Sensed() if event.task in self._sets:
+                alone = self._task_alone()
+                own_time = None if alone is None else self.knowledge.own_time(alone)
                 self._sense(event, self._sets[event.task], now)
+                self._heed(alone is None or alone == event.task or self.knowledge.own_time(alone) != own_time)
             case BodyFailed() if event.task in self._sets:
                 self._sets[event.task].body_failed = self._sets[event.task].active
+                self._heed(True)
             case TrialStarted():
                 self._begin_trial(event.learning, now)
+                self._heed(True)
             case RosterKnown():
                 self._roster = event.robots - {self.me}
-            case _:
-                return  # about a task this robot cannot do
-        self._wake = AT_ONCE
+                self._heed(True)
+
+    def _task_alone(self) -> str | None:
+        """The task that this robot works on, if nothing that happens elsewhere can change what it does there."""
+        one = self._at_work()
+        if one is None or not self._suppresses or self._appraisal.influence_on_active:
+            return None
+        return one.task if self._appraisal.contender(one.task) is None else None
+
+    def _at_work(self) -> Motivation | None:
+        """The first set that is active."""
+        return next((one for one in self._sets.values() if one.active_since is not None), None)
+
+    def _heed(self, at_once: bool) -> None:
+        """Something was perceived: a step is wanted at once, or, as nothing follows from it, when an attempt is judged."""
+        if at_once or self._wake is None:
+            self._wake = AT_ONCE
+        elif self._wake > AT_ONCE:
+            self._wake = min(self._wake, self.knowledge.settles_at() - EARLY)
 
     def is_refresh(self, event: Heard, now: float) -> bool:
         """Whether what is heard at `now` only goes on with what was heard before, so that `wake` stays as it is.
@@ -154,7 +177,7 @@ class Mind:
         A run is a refresh and the messages after it of the same teammate, task, attempt and expected time, as long as none
         says to be active for less long than the one before, and none was under way for longer than tau. To hand in the last
         of a run alone, with the instant of its arrival, leaves the mind as if all had been handed in: provided it is done
-        before any tick, before any other event (which ends the run), and before `next_lapse` is believed.
+        before any tick, before any other event but what other teammates say, and before `next_lapse` is believed.
         """
         return self._listener.is_refresh(event, now)
 
@@ -164,6 +187,8 @@ class Mind:
             monitor.completed(now)
         elif not event.applicable and one.applicable:
             monitor.interrupted(now)
+        if event.complete != one.complete:
+            self.hearing.watch(event.task, on=not event.complete)
         one.complete, one.applicable = event.complete, event.applicable
 
     def tick(self, now: float) -> list[Command]:
@@ -175,10 +200,9 @@ class Mind:
         commands, self._pending = self._pending, []
         working = self.active
         moment = self._moment = self._moment_at(now, before, working)
-        busy = bool(working) and self._suppresses
         for one in self._sets.values():
-            if busy and one.active_since is None:
-                one.suppress(now)
+            if self._suppresses and one.active_since is None and (working or one.sensory_feedback == 0):
+                one.keep_down(now)
                 continue
             suppressed = bool(working) and working != [one.task]
             factors = self._appraise(one, moment, suppressed=suppressed)
@@ -189,8 +213,8 @@ class Mind:
                 self._grow(one, factors, moment)
         activations = self._activate(now)
         any_news = self.hearing.note_checked()
-        at_rest = not (commands or activations or any_news or self._outlook.restless)
-        self._wake = None if at_rest else AT_ONCE
+        undecided = activations and self._task_alone() is None
+        self._wake = AT_ONCE if commands or undecided or any_news or self._outlook.restless else None
         return commands + activations + self._announce(now, before, urgent=bool(activations))
 
     def wake(self) -> float:
@@ -198,15 +222,15 @@ class Mind:
 
         A tick before it would let ramps grow and announce what is due, no more; it may be early, and a tick then does no
         harm. Minus infinity asks for the next step of the grid, infinity for none. It holds after a tick until an event is
-        handled that is no refresh (`is_refresh`), which makes it minus infinity. Learned times are not to be restored
-        in between.
+        handled that is no refresh (`is_refresh`), which may make it earlier: minus infinity, if what was perceived can
+        change what the next step decides. Learned times are not to be restored in between.
         """
         if self._wake is None:
             self._wake = self._foresee(self._before) - EARLY
         return self._wake
 
     def _foresee(self, now: float) -> float:
-        changes = [monitor.settles_at() for monitor in self.knowledge.monitors.values()]
+        changes = [self.knowledge.settles_at()]
         if self._waiting:
             changes.append(self._born + self.parameters.silence_timeout)
         elif not self.active:
@@ -217,16 +241,20 @@ class Mind:
         changes += [self._outlook.next_change(self._sets[task], now) for task in working or self._sets]
         return min(changes, default=math.inf)
 
-    def next_lapse(self) -> float:
+    def next_lapse(self, heeded: Collection[str] = ()) -> float:
         """The earliest instant at which a tick may find somebody silent that was not; cheap, and moved by each message.
 
         It may be early, never late, for what has been handed in; see `is_refresh` for what may be held back till now.
+
+        Args:
+            heeded: teammates of whom the driver knows that they go on with what they said last.
         """
-        return self.hearing.next_lapse()
+        return self.hearing.next_lapse(heeded)
 
     def rest(self, until: float) -> None:
         """The steps up to and including `until`, at which nothing was to be done, were left out; none is undone."""
         self._before = max(self._before, until)
+        self.hearing.note_checked(until)
 
     def _moment_at(self, now: float, before: float, working: list[str]) -> Moment:
         if self._waiting and self._roster_heard(now):
@@ -355,20 +383,30 @@ class Mind:
         half_a_step = (now - before) / 2
         return now >= self._broadcast_due - half_a_step - SLACK
 
-    def beat(self, now: float) -> list[Command]:
+    def beat(self, now: float) -> list[Announce]:
         """A step at `now` that does no more than a tick with nothing to decide: announce what is due."""
         before, self._before = self._before, now
+        self.hearing.note_checked(now)
         return self._announce(now, before, urgent=False)
 
-    def _announce(self, now: float, before: float, *, urgent: bool) -> list[Command]:
-        """Broadcast at rate rho, by the tick nearest to the instant due, and at once on activation."""
-        if not urgent and not self.is_broadcast_due(now, before):
-            return []
-        period = self._broadcast_period
-        kept = self._broadcast_due + period
-        self._broadcast_due = kept if not urgent and kept > now else now + period
-        working = self.active
-        if working:
-            one = self._sets[working[0]]
+    def keep_beat(self, now: float) -> None:
+        """Take the announcement due at the step `now` for made; what it would have said is `announcement`."""
+        kept = self._broadcast_due + self._broadcast_period
+        self._broadcast_due = kept if kept > now else now + self._broadcast_period
+
+    def announcement(self, now: float) -> list[Announce]:
+        """What there is to announce at `now`: nothing for an idle robot that keeps quiet (IDLE_HEARTBEAT, literal)."""
+        one = self._at_work()
+        if one is not None:
             return [Announce(one.task, one.active_for(now), one.expected)]
         return [Announce(None)] if self._beats else []
+
+    def _announce(self, now: float, before: float, *, urgent: bool) -> list[Announce]:
+        """Broadcast at rate rho, by the tick nearest to the instant due, and at once on activation."""
+        if urgent:
+            self._broadcast_due = now + self._broadcast_period
+        elif self.is_broadcast_due(now, before):
+            self.keep_beat(now)
+        else:
+            return []
+        return self.announcement(now)

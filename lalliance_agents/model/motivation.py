@@ -69,8 +69,8 @@ class Motivation:
         """Stay at `value`."""
         self.base, self.since, self.rate = value, now, 0.0
 
-    def suppress(self, now: float) -> None:
-        """Be 0 because another set is active; of the other factors nothing is known."""
+    def keep_down(self, now: float) -> None:
+        """Be 0, as another set is active or the behaviour does not apply; the other factors are not looked at."""
         self.hold(0.0, now)
         self.factors = None
 

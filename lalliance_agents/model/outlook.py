@@ -46,6 +46,8 @@ class Outlook:
     def next_change(self, one: Motivation, now: float) -> float:
         """The earliest instant at which the step after `now` may find `one` changed, but for its ramp."""
         factors = one.factors
+        if one.active_since is None and one.sensory_feedback == 0:
+            return math.inf
         if factors is None:
             return AT_ONCE
         if one.active_since is not None:

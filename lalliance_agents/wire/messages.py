@@ -150,6 +150,16 @@ class Effect(BaseModel):
     """Messages that were lost, delayed, doubled, reordered or held back."""
 
 
+class Drop(BaseModel):
+    """Messages of one sender that were not used, for one reason."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="ignore")
+
+    sender: Sender
+    reason: Word
+    count: Count
+
+
 class LinkReport(Message):
     """What a robot sent and received, and whether it kept its control period."""
 
@@ -157,6 +167,8 @@ class LinkReport(Message):
     received: Count
     dropped: Annotated[dict[str, Count], FIRST_FAULT]
     """Messages not used, by reason."""
+    drops: Annotated[list[Drop], FIRST_FAULT] = []
+    """Those of them that are dropped whatever faults there are, by sender and reason."""
     teammates: Annotated[dict[Name, Reception], FIRST_FAULT]
     effects: Annotated[list[Effect], FIRST_FAULT] = []
     """What faults did to messages on their arrival here."""

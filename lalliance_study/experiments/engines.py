@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lalliance_agents.errors import UserError
+from lalliance_agents.model.events import Cause, Verb
 from lalliance_agents.model.parameters import Parameters
 from lalliance_study.assignments import Floats
 from lalliance_study.baselines import BASELINES, repaired_optimum
@@ -27,6 +28,7 @@ class Account(NamedTuple):
     makespan: Floats
     """In seconds; NaN: given up."""
     reallocations: Floats
+    """Of minds: begun because a teammate was silent, too slow or gone; of plans: tasks given to another robot."""
     activations: Floats
     messages: Floats
 
@@ -46,10 +48,12 @@ def by_the_simulator(scenario: Scenario, parameters: Parameters, missions: Missi
     rows = []
     for number in range(len(missions.able)):
         mission, circumstances = mission_of(scenario, parameters, missions, number)
-        summary = Simulator(mission, circumstances=circumstances).run()
-        attempts = sum(len(task["attempts"]) for task in summary["tasks"].values())
-        makespan = math.nan if summary["makespan"] is None else summary["makespan"]
-        rows.append((makespan, len(summary["takeovers"]), attempts, math.nan))
+        simulator = Simulator(mission, circumstances=circumstances)
+        makespan = simulator.run()["makespan"]
+        live = [line for line in simulator.log if line.at >= simulator.world.began]
+        causes = [line.why for line in live if line.what == Verb.ACTIVATE.value]
+        taken = sum(cause != Cause.FREE.value for cause in causes)
+        rows.append((math.nan if makespan is None else makespan, taken, len(causes), math.nan))
     return Account(*np.array(rows, dtype=np.float64).T)
 
 

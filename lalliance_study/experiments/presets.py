@@ -146,6 +146,7 @@ def _of_parameters(sizes: _Sizes) -> Iterator[Experiment]:
             ),
         ),
         (*_each(Ordering.DERIVED), by_hand()),
+        part=50,
     )
     yield Experiment(
         "ablation",
@@ -161,6 +162,7 @@ def _of_parameters(sizes: _Sizes) -> Iterator[Experiment]:
             ),
         ),
         (DEFAULT, *read_otherwise()),
+        part=50,
     )
     yield Experiment(
         "sensitivity",
@@ -176,6 +178,7 @@ def _of_parameters(sizes: _Sizes) -> Iterator[Experiment]:
             *with_values("failure_factor", "failure_factor", (1.2, 4.0)),
             *with_values("trials", "mu", (1, 3)),
         ),
+        part=50,
     )
 
 

@@ -10,8 +10,8 @@
 | `proven` | whether these two are the same |
 | `shared_optimum` | in seconds, where the scenario is `shared_max` or `shared_add` and work left belongs to the task |
 | `ratio` | makespan / optimum |
-| `reallocations` | of tasks that a robot had begun; of a baseline: of tasks that a plan had given to a robot |
-| `activations`, `messages` | in the live trial, and sent in all; null for baselines, which send none |
+| `reallocations` | tasks begun as a teammate was silent, too slow or gone; of a baseline: that a new plan moved |
+| `activations`, `messages` | of the live trial; null for baselines; messages also where the simulator ran |
 | `unfinished` | whether it was given up |
 
 Optima are null where the experiment does not ask for them.

@@ -5,6 +5,7 @@ import asyncio
 import pytest
 
 from lalliance_agents import Robot
+from lalliance_agents.agent.reports import MOST_DROPS
 from lalliance_agents.agent.runtime import MOST_TEAMMATES
 from lalliance_agents.bus.base import Sample
 from lalliance_agents.bus.faulty import MOST_EFFECTS
@@ -16,6 +17,7 @@ from lalliance_agents.wire.messages import (
     LONGEST,
     MAX_PAYLOAD,
     Blindness,
+    Drop,
     Effect,
     LinkReport,
     LinkRule,
@@ -97,6 +99,7 @@ def test_the_largest_report_fits_into_a_message() -> None:
         teammates={name: Reception(received=2**32, silence=1.5, lapses=2**16, lost_for=1.5) for name in names},
         effects=[Effect(fault=f"{number:020}", sender="@others", count=2**32) for number in range(MOST_EFFECTS)]
         + [Effect(fault=f"{number:020}", sender=names[0], count=2**32) for number in range(MOST_EFFECTS)],
+        drops=[Drop(sender=names[0], reason="x" * 20, count=2**32) for _ in range(MOST_DROPS)],
         ticks=2**63 - 1,
         missed=2**63 - 1,
     )

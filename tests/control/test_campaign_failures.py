@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from lalliance_agents.mission_file import load_mission
 from lalliance_study.invariants import Violation
 from lalliance_study.pool import at_once
 from mission_control.campaign_command import campaign
+from mission_control.shell import ToldToEnd
 
 
 @pytest.fixture(autouse=True)
@@ -85,7 +87,7 @@ def test_ctrl_c_while_missions_are_made_small_still_writes_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*_: Any) -> None:
-        raise KeyboardInterrupt
+        raise ToldToEnd(signal.SIGINT)
 
     monkeypatch.setattr("lalliance_study.campaign.make_small", interrupted)
     assert ended(out=tmp_path) == 1

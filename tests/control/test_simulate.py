@@ -1,6 +1,11 @@
 """`lalliance simulate`: what it prints, and what it refuses."""
 
 import json
+import os
+import re
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -43,6 +48,79 @@ def test_a_mission_that_does_not_complete_is_status_1(processes: Processes) -> N
     done = processes.run("simulate", "short.yaml", "--runs", "2", "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)["makespan"] is None
+
+
+ENDLESS = """\
+name: endless
+tasks: {a: {}}
+robots: {one: {tasks: {a: 8}}}
+parameters: {max_delay: 0.3}
+faults: [{at: 1, robot: one, kind: crash}]
+deadline: 1e9
+"""
+
+
+def test_a_mission_without_an_end_is_warned_of_and_shows_how_far_it_is(tmp_path: Path) -> None:
+    (tmp_path / "endless.yaml").write_text(ENDLESS)
+    terminal, end = os.openpty()
+    words = [sys.executable, "-m", "mission_control", "simulate", str(tmp_path / "endless.yaml")]
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=end) as running:
+        os.close(end)
+        shown = ""
+        while not re.search(r"endless: \d,\d{3} s of at most 1,000,000,000 s", shown):
+            shown += os.read(terminal, 4096).decode()
+        running.send_signal(signal.SIGINT)
+        assert running.wait(10) == 130
+    os.close(terminal)
+    assert "warning" in shown
+    assert "tasks.a: no robot is left for it after crash of one at 1 s" in " ".join(shown.split())
+
+
+PLAIN = """\
+name: plain
+environment: {{kind: task_pool, hand_over: {hand_over}}}
+tasks: {{a: {{}}, b: {{}}, c: {{}}}}
+robots:
+  one: {{tasks: {{a: 6, b: 4}}}}
+  two: {{tasks: {{a: 7, b: 7, c: 5}}}}
+parameters: {{max_delay: 0.2}}
+deadline: 100
+"""
+
+
+@pytest.mark.parametrize(
+    ("hand_over", "optimum"), [("restart", 10.0), ("shared_max", 100 / 13), ("shared_add", 100 / 13)]
+)
+def test_the_optimum_is_told_where_it_is_known(processes: Processes, hand_over: str, optimum: float) -> None:
+    """With one robot each, `one` does a and b; else the other does 5/13 of a."""
+    (processes.folder / "plain.yaml").write_text(PLAIN.format(hand_over=hand_over))
+    document = processes.run_json("simulate", "plain.yaml")
+    assert document["optimum"] == pytest.approx(optimum)
+    assert document["ratio"] == pytest.approx(document["makespan"] / optimum)
+    assert document["ratio"] > 1
+    many = processes.run_json("simulate", "plain.yaml", "--runs", "3")
+    assert many["ratio"] == pytest.approx(many["makespan"]["mean"] / optimum)
+    told = f"{document['ratio']:.2f} times the optimum of {optimum:.1f} s"
+    assert told in processes.run("simulate", "plain.yaml").stdout
+    assert f"times the optimum of {optimum:.1f} s" in processes.run("simulate", "plain.yaml", "--runs", "2").stdout
+
+
+def test_no_optimum_is_told_of_a_mission_with_faults(processes: Processes) -> None:
+    document = processes.run_json("simulate", HANDLING)
+    assert (document["optimum"], document["ratio"]) == (None, None)
+    assert "optimum" not in processes.run("simulate", HANDLING).stdout
+
+
+def test_no_optimum_is_told_without_the_study_extra(tmp_path: Path) -> None:
+    (tmp_path / "plain.yaml").write_text(PLAIN.format(hand_over="restart"))
+    words = ["lalliance", "simulate", "plain.yaml", "--json"]
+    hidden = "import sys; sys.modules['scipy'] = sys.modules['ortools'] = None"
+    code = f"{hidden}; sys.argv = {words!r}; from mission_control.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    document = json.loads(done.stdout)
+    assert document["complete"]
+    assert (document["optimum"], document["ratio"]) == (None, None)
 
 
 @pytest.mark.parametrize(

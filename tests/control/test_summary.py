@@ -15,7 +15,7 @@ SUMMARY: dict[str, Any] = {
     "tasks": {},
     "takeovers": [],
     "trials": [30.0],
-    "messages": {"sent": 9, "received": 8, "dropped": {"lost": 3, "stale": 1}},
+    "messages": {"sent": 9, "received": 8, "dropped": {"lost": 3, "stale": 1}, "drops": []},
     "control": {"periods": 100, "missed": 60},
 }
 
@@ -88,3 +88,14 @@ def test_planned_faults_are_listed_with_their_times() -> None:
         read_fault('{"at": 2.5, "robot": "a", "kind": "blind"}'),
     ]
     assert list(fault_lines(faults)) == ["  at 4 s, until 9 s: crash of a", "  at 2.5 s: blind of a"]
+
+
+def test_who_was_cut_off_is_told() -> None:
+    drops = [
+        {"at": "lifter", "of": "pusher", "reason": "stale", "count": 3},
+        {"at": "@world", "of": "lifter", "reason": "cut off", "count": 40},
+    ]
+    messages = SUMMARY["messages"] | {"drops": drops}
+    lines = printed(SUMMARY | {"faults": [], "messages": messages})
+    assert len([line for line in lines if "cut off" in line]) == 1
+    assert any("lifter was cut off at @world: 40 messages, older than one that was made up" in line for line in lines)

@@ -69,6 +69,12 @@ def test_every_kind_of_fault_occurs(missions: list[Mission]) -> None:
     assert any(fault.end == float("inf") for fault in rules)
 
 
+def test_no_rule_delays_by_nothing() -> None:
+    """Such a rule can never fire; seed 1004 had drawn one in 20,000 missions."""
+    document, _ = draw_mission(1004, 6430)
+    assert 0.001 in [fault.get("delay") for fault in document["faults"]]
+
+
 def test_all_that_a_mission_can_say_is_said(missions: list[Mission]) -> None:
     own = [mission.parameters_of(robot) for mission in missions for robot in mission.robots]
     assert {one.strategy for one in own} == set(Strategy)

@@ -64,7 +64,7 @@ def test_an_injected_crash_is_carried_out_and_its_healing_starts_the_robot_again
     assert told == ["left present: left is there", "left gone: left is gone", "left present: left is there"]
     assert [(one["robot"], one["ended"]) for one in summary["tasks"]["a"]["attempts"]] == [
         ("left", "lost"),
-        ("left", None),
+        ("left", "complete"),
     ]
 
 

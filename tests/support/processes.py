@@ -24,8 +24,9 @@ class Processes:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._mark = uuid.uuid4().hex
-        # What a command that is killed leaves there goes with the test.
         self._temporary = tempfile.TemporaryDirectory(prefix="lalliance-test-", ignore_cleanup_errors=True)
+        #: Where the commands have their temporary files: what one that is killed leaves there goes with the test.
+        self.temporary = Path(self._temporary.name)
         self._started: list[subprocess.Popen[str]] = []
 
     def __enter__(self) -> Self:
@@ -60,7 +61,7 @@ class Processes:
                 _MARK: self._mark,
                 "COLUMNS": "120",
                 "XDG_RUNTIME_DIR": str(self.folder),
-                "TMPDIR": self._temporary.name,
+                "TMPDIR": str(self.temporary),
             },
         )
         self._started.append(process)

@@ -182,17 +182,23 @@ def test_a_journal_in_use_is_refused_by_a_second_world_server(processes: Process
     assert processes.alive() == []
 
 
-def test_the_journal_of_a_run_that_names_none_goes_with_it(
-    processes: Processes, small: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = processes.folder / "temporary"
-    folder.mkdir()
-    monkeypatch.setenv("TMPDIR", str(folder))
+def test_the_journal_of_a_run_that_names_none_goes_with_it(processes: Processes, small: Path) -> None:
     run = processes.start("run", small, "--plain")
     read_until(run, "left starts")
-    [own] = folder.iterdir()
+    [own] = processes.temporary.iterdir()
     assert own.stat().st_mode & 0o777 == 0o700
     assert (own / "journal").exists()
     run.send_signal(signal.SIGINT)
     run.communicate(timeout=10)
-    assert list(folder.iterdir()) == []
+    assert list(processes.temporary.iterdir()) == []
+
+
+def test_the_journal_of_a_run_that_was_killed_goes_with_the_next_run(processes: Processes, small: Path) -> None:
+    run = processes.start("run", small, "--plain")
+    read_until(run, "left starts")
+    run.kill()
+    run.communicate(timeout=10)
+    [left] = processes.temporary.iterdir()
+    processes.run("run", small, "--plain", "--connect", free_endpoint())
+    assert not left.exists()
+    assert list(processes.temporary.iterdir()) == []

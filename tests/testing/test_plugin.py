@@ -1,13 +1,17 @@
 """The plugin as its users see it: pytest runs inside pytest, on simulated missions, which take no time."""
 
+import math
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 
 # Inner runs forget what they import; what is imported here already is not loaded again by each of them.
 import lalliance_testing.launch
 import lalliance_testing.twin  # noqa: F401
+from lalliance_agents.mission_file import parse_mission
+from lalliance_study.simulator import Simulator
 
 pytest_plugins = "pytester"
 
@@ -157,6 +161,38 @@ mission.wait_for("takeover", robot="left", within=3)
         ],
         consecutive=False,
     )
+
+
+def test_a_failed_test_tells_the_faults_that_it_injected_so_that_they_can_be_repeated(
+    pytester: pytest.Pytester,
+) -> None:
+    body = """
+mission = lalliance_mission(MISSION)
+mission.wait_for("activate", robot="left", task="a")
+mission.inject(kind="stuck", robot="left", task="a", lasts=1.5)
+mission.inject(link={"from": "left", "to": "right"}, loss=0.5)
+crash = mission.inject(kind="crash", robot="right")
+mission.wait_for("gone", robot="right")
+mission.heal(crash)
+mission.wait_for("present", robot="right")
+mission.inject(kind="slow", robot="right", factor=2, lasts=1e6)
+mission.finish()
+mission.wait_for("takeover", robot="left", task="nothing")
+"""
+    result = run(pytester, body)
+    result.assert_outcomes(failed=1)
+    lines = result.outlines
+    first = lines.index("with the faults that the test injected, as lines of its faults:") + 1
+    faults = lines[first : first + 4]
+    [file] = [Path(line.split()[5]) for line in lines if line.startswith("The mission alone: lalliance simulate")]
+    repeated = parse_mission(file.read_text() + "faults:\n" + "\n".join(faults), "repeated.yaml")
+    stuck, lossy, crash, slow = repeated.faults
+    assert (stuck.at, stuck.end) == (lossy.at, pytest.approx(lossy.at + 1.5))
+    assert (lossy.end, slow.end) == (math.inf, math.inf)
+    assert crash.at == lossy.at < crash.end < slow.at
+    summary = Simulator(repeated).run()
+    [told] = [line for line in lines if re.search(r" s  complete after ", line)]
+    assert told.split("after ")[1] == f"{summary['makespan']:.1f} s"
 
 
 def test_a_mission_that_misses_its_deadline_fails_the_test_that_finishes_it(pytester: pytest.Pytester) -> None:

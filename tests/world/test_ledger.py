@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from lalliance_agents.wire.messages import DecisionMade, LinkReport
+from lalliance_agents.wire.messages import DecisionMade, Drop, LinkReport
 from world_server import ledger as module
 from world_server.ledger import Ledger
 
@@ -57,6 +57,17 @@ def test_what_is_no_takeover() -> None:
     assert ledger.decided(activation("left", "right", "silence"), 6.0) is not None
 
 
+def test_a_completed_task_has_no_attempt_without_an_end() -> None:
+    """Whatever reports of robots are still under way when the mission ends."""
+    ledger = Ledger(["a"])
+    for robot, at in (("left", 1.0), ("right", 2.0), ("third", 3.0)):
+        ledger.began(robot, "a", at)
+    ledger.failed("left", 4.0)
+    ledger.completed("a", ("right",), 5.0)
+    ledger.decided(activation("right", None, "sensed", verb="complete"), 5.1)
+    assert [one["ended"] for one in ledger.summary()["tasks"]["a"]["attempts"]] == ["lost", "complete", "complete"]
+
+
 def test_a_robot_that_came_back_has_not_failed_and_a_new_trial_knows_of_no_failure() -> None:
     ledger = Ledger(["a"])
     ledger.failed("left", 1.0)
@@ -98,13 +109,30 @@ def test_counters_are_the_latest_of_each_life_and_the_sum_of_all_lives() -> None
     ledger.reported(report("left", 2, sent=1, dropped={"loss": 3}))
     ledger.new_trial()
     for _ in range(2):
-        assert ledger.summary()["messages"] == {"sent": 109, "received": 3, "dropped": {"loss": 5, "stale": 1}}
+        messages = {"sent": 109, "received": 3, "dropped": {"loss": 5, "stale": 1}, "drops": []}
+        assert ledger.summary()["messages"] == messages
         assert ledger.summary()["control"] == {"periods": 30, "missed": 3}
     assert [ledger.has_final(robot) for robot in ("left", "right", "stranger")] == [False, True, False]
     ledger.reported(report("left", 2, sent=1, final=True))
     assert ledger.has_final("left")
     ledger.reported(report("left", 3, sent=1))
     assert not ledger.has_final("left")
+
+
+def test_who_dropped_what_of_whom_is_told_of_robots_and_of_the_world() -> None:
+    ledger = Ledger(["a"])
+    of_right = {"sender": "right", "reason": "stale"}
+    ledger.reported(report("left", 1, sent=5, drops=[Drop(**of_right, count=3)]))
+    ledger.reported(report("left", 1, sent=6, drops=[Drop(**of_right, count=4)]))
+    ledger.reported(report("left", 2, sent=1, drops=[Drop(**of_right, count=1)]))
+    ledger.dropped_here = {("right", "cut off"): 7}
+    assert ledger.summary()["messages"]["drops"] == [
+        {"at": "left", "of": "right", "reason": "stale", "count": 5},
+        {"at": "@world", "of": "right", "reason": "cut off", "count": 7},
+    ]
+    for life in range(3, 3 + 2 * module.MOST_DROPS):
+        ledger.reported(report("left", life, sent=1, drops=[Drop(sender=f"made-up-{life}", reason="stale", count=1)]))
+    assert len(ledger.drops()) == module.MOST_DROPS + 1
 
 
 def test_what_is_kept_is_limited_however_much_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

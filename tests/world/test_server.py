@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import re
 from itertools import pairwise
 from types import TracebackType
 from typing import Any, Self
@@ -13,8 +14,19 @@ from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.errors import UserError
 from lalliance_agents.mission_file import parse_mission
-from lalliance_agents.wire.keys import Key, Keys, Kind
-from lalliance_agents.wire.messages import BodyState, Event, Message, Status, TaskState
+from lalliance_agents.wire.keys import OPERATOR, Key, Keys, Kind
+from lalliance_agents.wire.messages import (
+    Action,
+    BodyState,
+    ChaosAnswer,
+    ChaosCommand,
+    Event,
+    Message,
+    Status,
+    TaskState,
+    decode,
+    encode,
+)
 from world_server.environments.base import TaskView
 from world_server.environments.task_pool import TaskPool
 from world_server.server import LINGER, WorldServer
@@ -164,6 +176,29 @@ async def test_strangers_and_hostile_presences_change_nothing(caplog: pytest.Log
         assert all(record.message.isprintable() for record in caplog.records if record.levelname == "WARNING")
         await served.work("left", "a", 5)
         assert served.events()[-1] == "a completed by left"
+
+
+async def test_a_robot_cut_off_by_a_made_up_action_is_told_aloud(caplog: pytest.LogCaptureFixture) -> None:
+    """Its action is heard no more, and its body rests; the log, the operator and the summary all say why."""
+    async with Served(PAIR + "deadline: 30") as served:
+        await served.appear("left", "right")
+        action = Action(sender="left", incarnation=2**63 - 1, seq=2**63 - 1, at=0.0, task="b", trial=1, fewest=0)
+        served.bus.put(served.keys.build(Kind.ACTION, robot="left"), encode(action), Delivery.STATE)
+        await served.work("left", "a", 25)
+        command = ChaosCommand(sender=OPERATOR, incarnation=1, seq=1, at=0.0, verb="status")
+        [answer] = await served.bus.query(served.keys.build(Kind.CHAOS_COMMAND), encode(command), timeout=1.0)
+        assert decode(ChaosAnswer, answer.payload).text.endswith("; cut off: left at @world")
+        told = [record.message for record in caplog.records if "cut off" in record.message]
+        assert len(told) == 1
+        assert re.match(r"left is cut off: for 1\d s nothing on lalliance/pair/body/left/action is newer than", told[0])
+        summary = await served.task
+    assert not summary["complete"]
+    cut_off, stale = summary["messages"]["drops"]
+    assert [cut_off, stale] == [
+        {"at": "@world", "of": "left", "reason": "cut off", "count": cut_off["count"]},
+        {"at": "@world", "of": "left", "reason": "stale", "count": 25 - cut_off["count"]},
+    ]
+    assert cut_off["count"] in {14, 15}
 
 
 async def test_a_progress_that_is_no_share_does_not_stop_the_world(monkeypatch: pytest.MonkeyPatch) -> None:

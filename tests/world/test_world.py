@@ -100,7 +100,7 @@ def test_a_mission_waits_runs_and_is_complete_with_its_last_task() -> None:
     assert summary["tasks"]["b"] == {
         "completed_at": 5.5,
         "by": ["right"],
-        "attempts": [{"robot": "right", "at": 1.5, "ended": None}],
+        "attempts": [{"robot": "right", "at": 1.5, "ended": "complete"}],
     }
     assert all(view.complete and not view.applicable for view in world.tasks().values())
 

@@ -17,6 +17,7 @@ This module does not know why a robot stops, who is allowed to work, or what a b
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Literal, Protocol
 from zlib import crc32
 
@@ -57,8 +58,23 @@ class Attempt:
     """What this attempt has done by itself, as a share; used where work restarts."""
 
 
-Crew = Mapping[str, Attempt]
-"""The attempts on one task, by robot."""
+class Crew(dict[str, Attempt]):
+    """The attempts on one task, by robot; none joins or leaves, or changes its rate, once a rate was asked for."""
+
+    @cached_property
+    def fastest(self) -> float:
+        """The greatest rate, in shares per second."""
+        return max(attempt.rate for attempt in self.values())
+
+    @cached_property
+    def together(self) -> float:
+        """All rates, in shares per second."""
+        return math.fsum(attempt.rate for attempt in self.values())
+
+
+_NOBODY = Crew()
+#: What a complete task looks like.
+_DONE = TaskView(complete=True, applicable=False, progress=1.0)
 
 
 class TaskWork(Protocol):
@@ -101,7 +117,7 @@ class SharedMax:
         return [robot for robot, attempt in crew.items() if attempt.rate >= fastest * (1 - 1e-9)]
 
     def _rate(self, crew: Crew) -> float:
-        return max(attempt.rate for attempt in crew.values())
+        return crew.fastest
 
 
 class SharedAdd(SharedMax):
@@ -112,7 +128,7 @@ class SharedAdd(SharedMax):
         return [robot for robot, attempt in crew.items() if attempt.rate > 0]
 
     def _rate(self, crew: Crew) -> float:
-        return math.fsum(attempt.rate for attempt in crew.values())
+        return crew.together
 
 
 class Restart:
@@ -165,13 +181,22 @@ class TaskPool(EventDriven):
         self._not_arrived = {task: spec.arrives for task, spec in mission.tasks.items() if spec.arrives > 0}
         self._next_arrival = min(self._not_arrived.values(), default=math.inf)
         self._actions: Mapping[str, Work] = {}
-        self._crews: dict[str, dict[str, Attempt]] = {}
+        self._crews: dict[str, Crew] = {}
+        #: How long until something changes while `_actions` stay the same, in seconds; None where that is to be looked up.
+        self._wait: float | None = None
         self._begun: dict[tuple[str, str], int] = {}
 
     def next_change(self, actions: Mapping[str, Work]) -> float:
         """See `Environment.next_change`."""
+        if actions != self._actions:
+            return self._next_change(self._crews_under(actions))
+        if self._wait is None:
+            self._wait = self._next_change(self._crews)
+        return self._wait
+
+    def _next_change(self, crews: Mapping[str, Crew]) -> float:
         soonest = self._next_arrival - self._now
-        for task, crew in self._crews_under(actions).items():
+        for task, crew in crews.items():
             if self._is_open(task):
                 soonest = min(soonest, self._work[task].time_left(crew))
         return max(soonest, 0.0)
@@ -187,8 +212,8 @@ class TaskPool(EventDriven):
 
     def _view(self, task: str) -> TaskView:
         if task in self._complete:
-            return TaskView(complete=True, applicable=False, progress=1.0)
-        progress = self._work[task].progress(self._crews.get(task, {}))
+            return _DONE
+        progress = self._work[task].progress(self._crews.get(task, _NOBODY))
         return TaskView(complete=False, applicable=self._is_open(task), progress=progress)
 
     def _is_open(self, task: str) -> bool:
@@ -199,22 +224,23 @@ class TaskPool(EventDriven):
             return
         self._crews = self._crews_under(actions)
         self._actions = dict(actions)
+        self._wait = None
         for task, crew in self._crews.items():
             for robot, attempt in crew.items():
                 self._begun[robot, task] = attempt.number
 
-    def _crews_under(self, actions: Mapping[str, Work]) -> dict[str, dict[str, Attempt]]:
+    def _crews_under(self, actions: Mapping[str, Work]) -> dict[str, Crew]:
         """The attempts in force while robots do `actions`, by task: those that go on, and new ones."""
         if actions == self._actions:
             return self._crews
-        crews: dict[str, dict[str, Attempt]] = {}
+        crews: dict[str, Crew] = {}
         for robot, work in actions.items():
             if (robot, work.task) in self._own_times and work.task not in self._complete:
-                crews.setdefault(work.task, {})[robot] = self._attempt(robot, work)
+                crews.setdefault(work.task, Crew())[robot] = self._attempt(robot, work)
         return crews
 
     def _attempt(self, robot: str, work: Work) -> Attempt:
-        current = self._crews.get(work.task, {}).get(robot)
+        current = self._crews.get(work.task, _NOBODY).get(robot)
         if current is not None:
             return replace(current, rate=work.pace / current.time)
         number = self._begun.get((robot, work.task), 0) + 1
@@ -226,6 +252,7 @@ class TaskPool(EventDriven):
     def _advance(self, dt: float) -> None:
         if dt == 0:
             return
+        self._wait = None
         self._now += dt
         for task, crew in self._crews.items():
             if self._is_open(task):
@@ -237,6 +264,7 @@ class TaskPool(EventDriven):
                 task: arrives for task, arrives in self._not_arrived.items() if arrives - self._now > SLACK
             }
             self._next_arrival = min(self._not_arrived.values(), default=math.inf)
+        self._wait = None
         due = [task for task in self._work if self._is_due(task)]
         return [(task, self._finish(task)) for task in due]
 
