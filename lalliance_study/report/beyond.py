@@ -66,13 +66,13 @@ def by_circumstances(comparisons: Sequence[Comparison]) -> dict[str, list[Compar
 
 
 def readings(contenders: Sequence[str]) -> dict[str, str]:
-    """Contenders that read an erratum otherwise, and how they are called."""
-    errata = {str(number): erratum for number, erratum in enumerate(Erratum, 1)}
+    """Contenders that read an erratum otherwise, and how they are called; in the order of the errata."""
     found = {}
-    for name in contenders:
-        reading, _, number = name.rpartition("/")[2].rpartition("-")
-        if reading in {"literal", "mended"} and number in errata:
-            found[name] = f"{number} {errata[number].replace('_', ' ')}{' mended' if reading == 'mended' else ''}"
+    for number, erratum in enumerate(Erratum, 1):
+        for reading, told in (("literal", ""), ("mended", " mended")):
+            name = f"{DERIVED}/{reading}-{number}"
+            if name in contenders:
+                found[name] = f"{number} {erratum.replace('_', ' ')}{told}"
     return found
 
 

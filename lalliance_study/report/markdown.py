@@ -26,6 +26,6 @@ def figure(name: str, caption: str) -> str:
     return f"![{caption}]({name}.png)\n\n*{caption}*\n"
 
 
-def bullets(lines: Sequence[str]) -> str:
-    """A list."""
-    return "".join(f"- {line}\n" for line in lines)
+def folded(title: str, text: str) -> str:
+    """What a reader opens only if it is wanted."""
+    return f"<details>\n<summary>{title}</summary>\n\n{text}\n</details>\n"

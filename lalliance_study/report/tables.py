@@ -18,9 +18,10 @@ from lalliance_study.report.beyond import (
 )
 from lalliance_study.report.claims import ratio_of
 from lalliance_study.report.comparisons import Comparison
-from lalliance_study.report.markdown import number, table
+from lalliance_study.report.markdown import folded, number, table
 from lalliance_study.report.optima import DERIVED, NEAR, log_mean, proven, size
 from lalliance_study.report.results import Measured
+from lalliance_study.report.statistics import Floats
 
 
 def rivals(found: Sequence[Measured]) -> str:
@@ -32,13 +33,16 @@ def rivals(found: Sequence[Measured]) -> str:
 def knowledge(found: Sequence[Measured]) -> str:
     """Each learner against itself with exact knowledge."""
     names = {told: name for name, told in LEARNERS.items() if name in found[0].times}
-    return _by_rule(found, names, lambda own, name: list(against_exact(own, name)), "relative to exact knowledge")
+    return folded(
+        "In numbers",
+        _by_rule(found, names, lambda own, name: list(against_exact(own, name)), "relative to exact knowledge"),
+    )
 
 
 def ablation(found: Sequence[Measured]) -> str:
     """Each erratum read otherwise against the default."""
     names = {told: name for name, told in readings(list(found[0].times)).items()}
-    return _by_rule(found, names, against_default, "relative to the default reading")
+    return folded("In numbers", _by_rule(found, names, against_default, "relative to the default reading"))
 
 
 def sensitivity(found: Sequence[Measured]) -> str:
@@ -49,7 +53,7 @@ def sensitivity(found: Sequence[Measured]) -> str:
         for symbol in PARAMETERS
         for value, name in sorted(values_of(contenders, symbol).items())
     }
-    return _by_rule(found, names, against_default, "relative to the default")
+    return folded("In numbers", _by_rule(found, names, against_default, "relative to the default"))
 
 
 def _by_rule(
@@ -111,22 +115,34 @@ def _distance(rule: str, contender: str, found: Sequence[Measured]) -> list[str]
 
 
 def growth(found: Sequence[Measured]) -> str:
-    """The mean ratio at each size and heterogeneity, also to the optimum for robots that share work, and to what is proven."""
-    body = []
-    for one in sorted(found, key=lambda one: (one.scenario.heterogeneity, one.scenario.tasks, one.number)):
-        ratios = one.ratios(DERIVED)
-        if not len(ratios):
-            continue
-        sharing = one.ratios(DERIVED, one.shared)
-        body.append(
-            [
-                f"{one.scenario.heterogeneity:g} %, {size(one.scenario)}, {one.scenario.hand_over}",
-                number(log_mean(ratios).ratio()),
-                number(log_mean(one.ratios("II/shortest_first")).ratio()),
-                number(log_mean(sharing).ratio()) if len(sharing) else "–",
-                f"{int(one.proven.sum())} of {one.missions}",
-                f"{one.ratios(DERIVED, one.bound).mean():.3f}",
-            ]
+    """Mean ratios at each size: of II derived, of II shortest first, and to the optimum of robots that share work."""
+    sharing = [one for one in found if one.scenario.hand_over != "restart"]
+    derived = _sizes(found, "II derived", lambda one: _distance_at(one, DERIVED, one.optimum))
+    shortest = _sizes(found, "II shortest first", lambda one: _distance_at(one, "II/shortest_first", one.optimum))
+    head = "II derived, to the optimum of robots that share work"
+    shared = _sizes(sharing, head, lambda one: _distance_at(one, DERIVED, one.shared))
+    return "\n".join([derived, folded("Shortest first, and another optimum", f"{shortest}\n{shared}")])
+
+
+def _sizes(found: Sequence[Measured], head: str, told: Callable[[Measured], str]) -> str:
+    """A row for each heterogeneity and size, a column for each hand-over."""
+    rules = [rule for rule in HAND_OVERS if any(one.scenario.hand_over == rule for one in found)]
+    ordered = sorted(found, key=lambda one: (one.scenario.heterogeneity, one.scenario.tasks, one.number))
+    cells: dict[str, dict[str, str]] = {}
+    for one in ordered:
+        cells.setdefault(f"{one.scenario.heterogeneity:g} %, {size(one.scenario)}", {})[one.scenario.hand_over] = told(
+            one
         )
-    head = ["", "II derived", "II shortest first", "II derived, to the shared optimum", "proven", "at most"]
-    return table(head, body, right=True)
+    return table(
+        [head, *rules], [[row, *(line.get(rule, "–") for rule in rules)] for row, line in cells.items()], right=True
+    )
+
+
+def _distance_at(one: Measured, contender: str, yardstick: Floats) -> str:
+    """A mean ratio, and where the optimum is not proven what it is at most."""
+    if not len(ratios := one.ratios(contender, yardstick)):
+        return "–"
+    told = number(log_mean(ratios).ratio())
+    if yardstick is not one.optimum or one.proven.all():
+        return told
+    return f"{told}; {int(one.proven.sum())} of {one.missions} proven, at most {one.ratios(contender, one.bound).mean():.3f}"
