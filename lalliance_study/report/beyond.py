@@ -57,6 +57,12 @@ def against_exact(found: Sequence[Measured], contender: str) -> Iterator[Compari
             yield compare(one.number, one.draws, one.scenario, one.times[contender], theirs)
 
 
+def more_unfinished(comparisons: Sequence[Comparison]) -> float:
+    """The share of missions that the first leaves unfinished, less that of the second."""
+    missions = sum(one.missions for one in comparisons)
+    return sum(one.only_second - one.only_first for one in comparisons) / missions if missions else 0.0
+
+
 def by_circumstances(comparisons: Sequence[Comparison]) -> dict[str, list[Comparison]]:
     """Comparisons in groups, by what befalls the team or what it knows."""
     groups: dict[str, list[Comparison]] = {}

@@ -17,6 +17,7 @@ from lalliance_study.report.beyond import (
     against_default,
     against_exact,
     by_circumstances,
+    more_unfinished,
     readings,
     values_of,
 )
@@ -39,6 +40,8 @@ COLOURS = {
     **STRATEGIES,
     "ALLIANCE": GREY,
 }
+#: A share of missions that is not worth a mark.
+FEW = 0.01
 #: Dots by row, and within a row by what they are a mark of.
 Dots = Mapping[str, Mapping[str, Sequence[Comparison]]]
 
@@ -82,39 +85,54 @@ def _dotted(
 ) -> Figure:
     """Panels of ratios as dots with their intervals: a row for each name, heterogeneity down, hand-over across."""
     levels = sorted({one.scenario.heterogeneity for one in found})
-    figure = Figure(figsize=(10.4, 0.9 + len(levels) * (0.5 + 0.23 * len(rows))))
+    made = {
+        (level, rule): dots(
+            [one for one in found if (one.scenario.hand_over, one.scenario.heterogeneity) == (rule, level)]
+        )
+        for level in levels
+        for rule in HAND_OVERS
+    }
+    groups = list(dict.fromkeys(group for panel in made.values() for name in rows for group in panel[name]))
+    height = len(rows) * (0.14 + 0.045 * len(groups))
+    figure = Figure(figsize=(10.4, 1.3 + len(levels) * (0.5 + height)))
     panels: Panels = figure.subplots(len(levels), len(HAND_OVERS), sharex=True, sharey=True, squeeze=False).tolist()
-    marked: dict[str, None] = {}
     for row, level in zip(panels, levels, strict=True):
         for axes, rule in zip(row, HAND_OVERS, strict=True):
-            own = [one for one in found if (one.scenario.hand_over, one.scenario.heterogeneity) == (rule, level)]
-            made = dots(own)
-            groups = list(dict.fromkeys(group for name in rows for group in made[name]))
-            marked.update(dict.fromkeys(groups))
-            for place, name in enumerate(rows):
-                for number, group in enumerate(groups):
-                    shift = 0.7 * ((number + 0.5) / len(groups) - 0.5)
-                    _dot(axes, place + shift, made[name].get(group, ()), COLOURS[group])
+            _dotted_panel(axes, made[level, rule], rows, groups)
         row[0].set_ylabel(f"heterogeneity {level:g} %")
     _dotted_axes(panels, rows, says)
-    marks = [Line2D([], [], linestyle="none", marker="o", color=COLOURS[group], label=group) for group in marked]
+    marks = [Line2D([], [], linestyle="none", marker="o", color=COLOURS[group], label=group) for group in groups]
     marks.append(Line2D([], [], linestyle="none", marker="x", color=GREY, label="leaves more than 1 % more unfinished"))
     figure.legend(handles=marks, loc="outside lower center", ncols=4)
     return figure
 
 
-def _dot(axes: "Axes", place: float, comparisons: Sequence[Comparison], colour: str) -> None:
-    """One pooled ratio; a cross where more missions are left unfinished, with their share."""
-    missions = sum(one.missions for one in comparisons)
-    more = sum(one.only_second - one.only_first for one in comparisons) / missions if missions else 0.0
+def _dotted_panel(axes: "Axes", dots: Dots, rows: Sequence[str], groups: Sequence[str]) -> None:
+    """The dots of one panel, and right of it how many missions more are left unfinished, a column for each group."""
+    some = False
+    for place, name in enumerate(rows):
+        for number, group in enumerate(groups):
+            comparisons = dots[name].get(group, ())
+            more = more_unfinished(comparisons)
+            shift = 0.7 * ((number + 0.5) / len(groups) - 0.5)
+            _dot(axes, place + shift, comparisons, "x" if more > FEW else "o", COLOURS[group])
+            if more > FEW:
+                some = True
+                told = axes.text(
+                    1.02 + 0.085 * number, place, f"{100 * more:.0f}", transform=axes.get_yaxis_transform()
+                )
+                told.set(color=COLOURS[group], fontsize=7, va="center")
+    if some:
+        axes.text(1.02, 1.0, "% more\nunfinished", transform=axes.transAxes, va="bottom", fontsize=7, color=GREY)
+
+
+def _dot(axes: "Axes", place: float, comparisons: Sequence[Comparison], marker: str, colour: str) -> None:
+    """One pooled ratio with its interval, if there is one."""
     ratio = pooled(comparisons)
     if ratio is not None:
         value, low, high = ratio.ratio()
         axes.plot([low, high], [place, place], color=colour, linewidth=1.2)
-        axes.plot(value, place, marker="x" if more > 0.01 else "o", color=colour, markersize=4.5)
-    if more > 0.01:
-        at, told = (1.0, f"{more:.0%} unfinished") if ratio is None else (ratio.ratio().high, f"{more:.0%}")
-        axes.annotate(told, (at, place), xytext=(4, -2.5), textcoords="offset points", color=colour, fontsize=6.5)
+        axes.plot(value, place, marker=marker, color=colour, markersize=4.5)
 
 
 def _dotted_axes(panels: Panels, rows: Sequence[str], says: str) -> None:

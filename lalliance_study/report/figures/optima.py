@@ -152,6 +152,8 @@ def growth(found: Sequence[Measured]) -> Figure:
         axes.set_xticks([robots for robots, _ in sizes], [f"{robots}\n{tasks}" for robots, tasks in sizes])
         axes.xaxis.set_minor_locator(NullLocator())
     panels[0][0].legend(loc="upper left")
+    near = panels[0][0].text(0.99, NEAR, "20 %", transform=panels[0][0].get_yaxis_transform(), ha="right", va="bottom")
+    near.set(fontsize=8.5, color=GREY)
     return figure
 
 
