@@ -159,3 +159,37 @@ def _told_to_end() -> Iterator[list[int]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@study.command()
+def report(
+    results: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a study, whole or not.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Where the report is written; default: report in the study's folder."),
+    ] = None,
+) -> None:
+    """Draw the figures of a study and write report.md: every claim of the paper with its verdict.
+
+    A study that is not complete is reported as far as it goes, and the report says so.
+    """
+    from lalliance_study.extras import study_package
+
+    for package in ("matplotlib", "polars", "scipy"):
+        study_package(package)
+    from lalliance_study.pool import progress
+    from lalliance_study.report.report import report as write
+    from lalliance_study.report.report import steps
+    from lalliance_study.report.results import Results
+
+    found = Results(results)
+    if found.missing:
+        typer.echo(
+            f"lalliance: warning: {found.missing} of {found.parts} parts are missing; "
+            f"lalliance study run --preset {found.manifest.preset} --missions {found.manifest.missions} "
+            f"--seed {found.manifest.seed} --out {results} goes on with them",
+            err=True,
+        )
+    with progress("report", steps()) as advance:
+        page = write(found, results / "report" if out is None else out, advance)
+    typer.echo(f"the report is {page}")

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -18,6 +17,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, PercentF
 from lalliance_study.detection.law import Loss, Timing, detection_quantile, suspicions
 from lalliance_study.detection.probe import RATE
 from lalliance_study.detection.rows import Cost, Detections, Suspicions, load
+from lalliance_study.drawing import BLUE, FORMS, GREY, style, write
+from lalliance_study.drawing import VERMILION as RED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,46 +34,25 @@ COLOURS = {
     8.0: "#882255",
     10.0: "#000000",
 }
-BLUE, RED = "#0072B2", "#D55E00"
-STYLE: Any = {  # its keys are literals that mypy knows only if matplotlib is there
-    "font.size": 9.5,
-    "axes.titlesize": 10.5,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#E4E4E4",
-    "grid.linewidth": 0.7,
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "figure.constrained_layout.use": True,
-    "svg.hashsalt": "lalliance",
-    "svg.fonttype": "none",
-}
 HOUR = 3600.0
 _REAL: dict[str, Any] = {"marker": "D", "markersize": 6.5, "color": "black", "markeredgecolor": "black", "zorder": 5}
 #: Standard errors of a 95 % interval.
 WIDE = 1.96
 
 
-def draw(rows: Path, out: Path, forms: Sequence[str] = ("png", "svg")) -> list[Path]:
+def draw(rows: Path, out: Path, forms: Sequence[str] = FORMS) -> list[Path]:
     """Draw all figures in each of `forms`; the files written."""
-    out.mkdir(parents=True, exist_ok=True)
     counted = load(rows / "suspicions.csv", Suspicions) + load(rows / "suspicions-real.csv", Suspicions)
     timed = load(rows / "detections.csv", Detections) + load(rows / "detections-real.csv", Detections)
     costs = load(rows / "costs.csv", Cost)
-    with mpl.rc_context(STYLE):
+    with style():
         drawn = {
             "false-suspicions": false_suspicions(counted),
             "stairs": stairs([row for row in counted if row.source == "simulated"]),
             "detection-time": detection_time(timed),
             "mission-cost": mission_cost(costs),
         }
-        paths = [out / f"{name}.{form}" for name in drawn for form in forms]
-        for path in paths:
-            metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-            drawn[path.stem].savefig(path, dpi=160, metadata=metadata)
-    return paths
+        return write(drawn, out, forms)
 
 
 def poisson_interval(count: int) -> tuple[float, float]:
@@ -103,13 +83,12 @@ def _label_ends(axes: "Axes", at: float, ends: Mapping[float, float], apart: flo
 
 
 def _legend(axes: "Axes", *, real: bool, measured: str, columns: int = 1) -> None:
-    grey = "#777777"
     marks = [
-        Line2D([], [], color=grey, marker="o", markersize=4.5, linestyle="none", label=measured),
-        Line2D([], [], color=grey, linestyle="--", linewidth=1.3, label="law"),
+        Line2D([], [], color=GREY, marker="o", markersize=4.5, linestyle="none", label=measured),
+        Line2D([], [], color=GREY, linestyle="--", linewidth=1.3, label="law"),
     ]
     if real:
-        marks.append(_real_mark(grey))
+        marks.append(_real_mark(GREY))
     axes.legend(handles=marks, loc="lower right" if columns == 1 else "upper left", ncols=columns, columnspacing=1.2)
 
 
@@ -179,7 +158,7 @@ def stairs(rows: Sequence[Suspicions]) -> Figure:
     laws = [suspicions(Loss(loss), Timing(float(tau_rho) / RATE)) * HOUR for tau_rho in grid]
     axes.plot(grid, laws, linestyle="--", linewidth=1.3, color=BLUE, label="law")
     simple = [RATE * (1 - loss) * loss**tau_rho * HOUR for tau_rho in grid]
-    axes.plot(grid, simple, linestyle=":", linewidth=1.2, color="#777777", label="ρ (1 − p) p$^{τρ}$, not rounded")
+    axes.plot(grid, simple, linestyle=":", linewidth=1.2, color=GREY, label="ρ (1 − p) p$^{τρ}$, not rounded")
     for jitter, marker, colour in ((0.0, "o", BLUE), (max(row.jitter for row in rows), "s", RED)):
         own = sorted(
             (row for row in rows if row.jitter == jitter and row.loss == loss and not row.burst),
