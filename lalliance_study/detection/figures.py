@@ -209,13 +209,13 @@ def _one_detection_line(axes: "Axes", rows: Sequence[Detections], shift: float) 
         "simulated": {"marker": "o", "markersize": 4.5, "color": colour},
         "real": _REAL | {"markerfacecolor": colour},
     }
-    for source, style in styles.items():
+    for source, look in styles.items():
         own = [row for row in rows if row.source == source]
         if own:
             middle = np.array([row.p50 for row in own])
             spread = np.abs(np.array([[row.p10 for row in own], [row.p90 for row in own]]) - middle)
             places = [row.loss + shift + (0.014 if source == "real" else 0.0) for row in own]
-            axes.errorbar(places, middle, yerr=spread, linestyle="none", elinewidth=1, **style)
+            axes.errorbar(places, middle, yerr=spread, linestyle="none", elinewidth=1, **look)
     return law[-1]
 
 
