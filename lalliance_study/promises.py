@@ -6,8 +6,8 @@ A mission is *promised* where
   slower than `AS_GOOD_AS_STUCK` counts as stuck), and in trials before the live one, where faults do not happen, a robot that
   does not join later;
 - nobody who lives is stuck for good at what another can do; or else failures teach: L-ALLIANCE, an ordering in which a
-  failed task is wanted less, delays that differ, no attempt that is too short to be told from a collision, no rule of links
-  for good, by which teammates might not learn of it;
+  failed task is wanted less, delays that differ, no attempt that is too short to be told from a collision, or to outlast
+  the patience of teammates, no rule of links for good, by which teammates might not learn of it;
 - an attempt can be long enough where work starts from zero each time: its limits are long (by hand), or grow with each failure
   (L-ALLIANCE), which must not be too short either;
 - the Appendix is read as mended (the second patience may be read either way).
@@ -34,13 +34,16 @@ from lalliance_agents.faults import (
     Stuck,
     robot_of,
 )
-from lalliance_agents.model.parameters import Architecture, Erratum, Learning, Ordering, Parameters
+from lalliance_agents.model.parameters import Architecture, Erratum, Learning, Ordering, Parameters, Strategy
 from world_server.environments.box_pushing import BoxPushing
 
 #: A robot slowed for good by more than this is as good as stuck.
 AS_GOOD_AS_STUCK = 20.0
 #: By how much limits of attempts must grow from one to the next where work restarts.
 LEAST_GROWTH = 1.5
+#: A robot that gives up before so many of its own times is back at its task, bored, before teammates that are patient for as
+#: long (strategy III) take it to have left: they hear it "on the task" for tau after it has.
+OUTLASTS = 1.1
 #: What comes between a fault's end and the team being as if it had not been: start-up, presence, refreshed senses; in seconds.
 RECOVERY = 3.0
 #: The bound is this many times the sum of all tasks, and these seconds more.
@@ -146,6 +149,9 @@ def _learns_nothing(mission: Mission) -> str:
         return "stuck in active learning, in which nobody gives up"
     if any(isinstance(fault, LinkFault | Partition | RadioFault) and fault.end == math.inf for fault in mission.faults):
         return "stuck, and teammates may not hear of it"
+    own = [mission.parameters_of(robot) for robot in mission.robots]
+    if any(one.strategy is Strategy.III for one in own) and any(one.give_up_factor < OUTLASTS for one in own):
+        return "stuck, and giving up before teammates lose their patience"
     return next(filter(None, (_fails_in_vain(mission, robot) for robot in mission.robots)), "")
 
 
