@@ -55,6 +55,7 @@ class Speaker(Protocol):
     """Whoever speaks at the beginning of a link."""
 
     name: str
+    trial: int
     longest_gap: float
     """The longest time between two of its announcements, in seconds."""
     latest: Spoken | None
@@ -165,7 +166,8 @@ class AirLink:
         if not self.hearer.there:
             return True
         steady = self._can_settle and self.rule is None and self._latest <= comes
-        return steady and self._content is content and self.hearer.runs
+        understood = self.speaker.trial == self.hearer.trial and self._content is content
+        return steady and understood and self.hearer.runs
 
     def settle(self) -> None:
         """From now on nobody waits for what comes."""

@@ -53,6 +53,7 @@ class Voice:
         #: Links to those who hear it on a task, and idle.
         self.on: dict[str, list[AirLink]] = {}
         self.idle: list[AirLink] = []
+        self.trial = 0
         self.latest: Spoken | None = None
         self.unmade = math.inf
         #: Announcements of all lives; and those of them for which no whole control step was made.
@@ -70,7 +71,7 @@ class Voice:
     def begin(self, mind: Mind, grid: Grid, incarnation: int, now: float) -> None:
         """Speak for a robot that begins a new life."""
         self._mind, self._grid = mind, grid
-        self._incarnation, self._trial = incarnation, 0
+        self._incarnation, self.trial = incarnation, 0
         self._content = None
         self._seq = 0
         self._beat_step = 0
@@ -101,7 +102,7 @@ class Voice:
         """What is said from now on is news; in a new trial, if one is named."""
         self.unsettle(now)
         self._content = None
-        self._trial = self._trial if trial is None else trial
+        self.trial = self.trial if trial is None else trial
 
     def announce(self, said: Announce, now: float) -> None:
         """Send an announcement."""
@@ -178,4 +179,4 @@ class Voice:
 
     def _spoken(self, said: Announce, now: float, first: int | None = None) -> Spoken:
         heard = Heard(self.name, said.task, said.active_for, said.expected)
-        return Spoken(now + self._delay, self._incarnation, self._seq, self._trial, self._content, heard, first)
+        return Spoken(now + self._delay, self._incarnation, self._seq, self.trial, self._content, heard, first)
