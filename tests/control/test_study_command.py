@@ -136,7 +136,6 @@ def test_a_folder_that_cannot_be_written_to_is_refused(processes: Processes) -> 
     [
         ("polars", "study", ()),
         ("ortools", "study", ()),
-        ("joblib", "cluster", ("--backend", "dask", "--scheduler", "tcp://127.0.0.1:1")),
         ("distributed", "cluster", ("--backend", "dask", "--scheduler", "tcp://127.0.0.1:1")),
     ],
 )

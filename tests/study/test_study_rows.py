@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,11 +12,15 @@ import pytest
 from support.processes import Processes, until
 from support.small_study import SMALL, carry_out
 
-from lalliance_agents.errors import UserError
+from lalliance_agents.errors import LallianceError, UserError
 from lalliance_study.experiments import cluster, rows
 from lalliance_study.experiments.plan import numbered
-from lalliance_study.experiments.runner import here, open_study
+from lalliance_study.experiments.runner import here, open_study, run
 from lalliance_study.scenarios import Scenario
+
+
+#: Processes start slowly on a busy machine.
+pytestmark = pytest.mark.timeout(300)
 
 
 @pytest.fixture(scope="module")
@@ -113,20 +118,57 @@ def test_a_part_that_was_being_written_is_no_part(whole: pl.DataFrame, tmp_path:
     assert rows.read(tmp_path).is_empty()
 
 
-def test_a_scheduler_with_two_workers_gives_the_same_rows(
-    whole: pl.DataFrame, tmp_path: Path, processes: Processes
-) -> None:
+@pytest.fixture
+def scheduler(tmp_path: Path, processes: Processes) -> "tuple[subprocess.Popen[str], Path]":
+    """A Dask scheduler on this machine, and the file that says where it is."""
     file = tmp_path / "scheduler.json"
-    quiet = ("--no-dashboard", "--scheduler-file", file)
-    processes.start_module("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", *quiet)
-    until(file.exists)
+    words = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file)
+    process = processes.start_module("distributed.cli.dask_scheduler", *words)
+    until(lambda: file.exists() and file.read_text().endswith("}"))
+    return process, file
+
+
+def add_workers(processes: Processes, file: Path) -> str:
+    """Two of them; the scheduler's address."""
     for _ in range(2):
-        processes.start_module("distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", *quiet)
-    address = json.loads(file.read_text())["address"]
+        words = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--scheduler-file", file)
+        processes.start_module("distributed.cli.dask_worker", *words)
+    address: str = json.loads(file.read_text())["address"]
+    return address
+
+
+def test_a_scheduler_with_two_workers_gives_the_same_rows(
+    whole: pl.DataFrame, tmp_path: Path, processes: Processes, scheduler: "tuple[subprocess.Popen[str], Path]"
+) -> None:
     out = tmp_path / "out"
-    came = carry_out(out, cluster.at_workers_of(address))
-    assert len(came) > 2
+    came = carry_out(out, cluster.at_workers_of(add_workers(processes, scheduler[1])))
+    assert sum(came) == whole.height
     assert rows.read(out).equals(whole)
+
+
+def test_a_run_whose_scheduler_is_lost_is_gone_on_with(
+    whole: pl.DataFrame, tmp_path: Path, processes: Processes, scheduler: "tuple[subprocess.Popen[str], Path]"
+) -> None:
+    out, (process, file) = tmp_path / "out", scheduler
+    hand_out = cluster.at_workers_of(add_workers(processes, file))
+
+    def lose(_: int) -> None:
+        process.kill()
+
+    with pytest.raises(LallianceError, match="is lost; the same command goes on with what is left"):
+        run(open_study(out, SMALL, seed=3), hand_out, lose)
+    assert 0 < len(rows.kept(out)) < 25
+    carry_out(out, here(1))
+    assert rows.read(out).equals(whole)
+
+
+def test_a_scheduler_without_workers_is_told_of(
+    scheduler: "tuple[subprocess.Popen[str], Path]", monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address = json.loads(scheduler[1].read_text())["address"]
+    monkeypatch.setattr(cluster, "PATIENCE", 2.0)
+    with pytest.raises(UserError, match=f"--scheduler {address}: it has no workers; expected at least one dask worker"):
+        cluster.at_workers_of(address)
 
 
 def test_a_scheduler_that_does_not_answer_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,7 @@ SMALL = Preset(
         Experiment(
             "dear",
             "Does the optimum help?",
-            (Grid(((8, 16, 4),), (100.0,), circumstances=(PLAIN, DYING)),),
+            (Grid(((6, 12, 4),), (100.0,), circumstances=(PLAIN, DYING)),),
             tuple(map(baseline, ("random", "lpt", "optimum"))),
             Yardsticks(work_limit=1.0, shared=True),
             part=1,
