@@ -7,9 +7,9 @@ import numpy as np
 import polars as pl
 
 from lalliance_study.experiments import rows
-from lalliance_study.experiments.contenders import SHORT
+from lalliance_study.experiments.contenders import SHORT, Contender
 from lalliance_study.experiments.manifest import Manifest
-from lalliance_study.experiments.plan import Part, parts
+from lalliance_study.experiments.plan import Numbered, Part, parts
 from lalliance_study.experiments.presets import preset
 from lalliance_study.report.results import Measured
 from lalliance_study.report.statistics import Floats
@@ -74,35 +74,41 @@ def make_up(
 def _rows(part: Part, factor: Factor, *, proven: bool) -> pl.DataFrame:
     first = part.scenarios[0]
     chance = np.random.default_rng([part.seed, first.draws, part.first])
-    count = part.last - part.first
-    optimum = chance.uniform(80, 120, count)
-    found = []
-    for one in part.scenarios:
-        for contender in part.experiment.contenders:
-            makespan = _makespans(chance, factor(one.scenario, contender.name), optimum)
-            found.append(
-                pl.DataFrame(
-                    {
-                        "experiment": one.experiment,
-                        "scenario": one.number,
-                        "mission": np.arange(part.first, part.last),
-                        "seed": part.seed,
-                        "contender": contender.name,
-                        "kind": contender.kind,
-                        "strategy": contender.strategy,
-                        "ordering": contender.ordering,
-                        "variant": contender.variant,
-                        "makespan": pl.Series(makespan).fill_nan(None),
-                        "optimum": optimum,
-                        "bound": optimum if proven else 0.9 * optimum,
-                        "proven": proven,
-                        "shared_optimum": 0.9 * optimum if one.scenario.hand_over != "restart" else None,
-                        "ratio": pl.Series(makespan / optimum).fill_nan(None),
-                        "reallocations": 0,
-                        "activations": 1,
-                        "messages": 1,
-                        "unfinished": np.isnan(makespan),
-                    }
-                ).cast(dict(rows.SCHEMA))
-            )
-    return pl.concat(found)
+    optimum = chance.uniform(80, 120, part.last - part.first)
+    who = [(one, contender) for one in part.scenarios for contender in part.experiment.contenders]
+    makespan = np.concatenate(
+        [_makespans(chance, factor(one.scenario, contender.name), optimum) for one, contender in who]
+    )
+    every = np.tile(optimum, len(who))
+    shared = np.repeat([one.scenario.hand_over != "restart" for one, _ in who], len(optimum))
+
+    def each(told: Callable[[Numbered, Contender], object]) -> pl.Series:
+        return pl.Series([told(*pair) for pair in who]).repeat_by(len(optimum)).explode()
+
+    return (
+        pl.DataFrame(
+            {
+                "experiment": part.experiment.name,
+                "scenario": each(lambda one, _: one.number),
+                "mission": np.tile(np.arange(part.first, part.last), len(who)),
+                "seed": part.seed,
+                "contender": each(lambda _, contender: contender.name),
+                "kind": each(lambda _, contender: contender.kind),
+                "strategy": each(lambda _, contender: contender.strategy),
+                "ordering": each(lambda _, contender: contender.ordering),
+                "variant": each(lambda _, contender: contender.variant),
+                "makespan": makespan,
+                "optimum": every,
+                "bound": every if proven else 0.9 * every,
+                "proven": proven,
+                "shared_optimum": np.where(shared, 0.9 * every, np.nan),
+                "ratio": makespan / every,
+                "reallocations": 0,
+                "activations": 1,
+                "messages": 1,
+                "unfinished": np.isnan(makespan),
+            }
+        )
+        .cast(dict(rows.SCHEMA))
+        .fill_nan(None)
+    )

@@ -109,21 +109,24 @@ def _dotted(
 
 def _dotted_panel(axes: "Axes", dots: Dots, rows: Sequence[str], groups: Sequence[str]) -> None:
     """The dots of one panel, and right of it how many missions more are left unfinished, a column for each group."""
-    some = False
     for place, name in enumerate(rows):
         for number, group in enumerate(groups):
             comparisons = dots[name].get(group, ())
-            more = more_unfinished(comparisons)
             shift = 0.7 * ((number + 0.5) / len(groups) - 0.5)
-            _dot(axes, place + shift, comparisons, "x" if more > FEW else "o", COLOURS[group])
-            if more > FEW:
-                some = True
-                told = axes.text(
-                    1.02 + 0.085 * number, place, f"{100 * more:.0f}", transform=axes.get_yaxis_transform()
-                )
-                told.set(color=COLOURS[group], fontsize=7, va="center")
-    if some:
-        axes.text(1.02, 1.0, "% more\nunfinished", transform=axes.transAxes, va="bottom", fontsize=7, color=GREY)
+            marker = "x" if more_unfinished(comparisons) > FEW else "o"
+            _dot(axes, place + shift, comparisons, marker, COLOURS[group])
+    left = {
+        group: {
+            place: more for place, name in enumerate(rows) if (more := more_unfinished(dots[name].get(group, ()))) > FEW
+        }
+        for group in groups
+    }
+    for number, (group, shares) in enumerate((group, shares) for group, shares in left.items() if shares):
+        for place, share in shares.items():
+            told = axes.text(1.02 + 0.11 * number, place, f"{100 * share:.0f}", transform=axes.get_yaxis_transform())
+            told.set(color=COLOURS[group], fontsize=7, va="center")
+    if any(left.values()):
+        axes.text(1.02, 0.0, "% more\nunfinished", transform=axes.transAxes, va="top", fontsize=7, color=GREY)
 
 
 def _dot(axes: "Axes", place: float, comparisons: Sequence[Comparison], marker: str, colour: str) -> None:
