@@ -18,7 +18,6 @@ from lalliance_study.experiments.plan import numbered
 from lalliance_study.experiments.runner import here, open_study, run
 from lalliance_study.scenarios import Scenario
 
-
 #: Processes start slowly on a busy machine.
 pytestmark = pytest.mark.timeout(300)
 
