@@ -12,7 +12,7 @@ from support.made_up_study import make_up
 from support.processes import Processes
 
 from lalliance_agents.errors import UserError
-from lalliance_study.extras import MissingExtraError
+from lalliance_agents.extras import MissingExtraError
 from lalliance_study.report.claims import Claim
 from lalliance_study.report.report import report
 from lalliance_study.report.results import Results
