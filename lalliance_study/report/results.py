@@ -1,6 +1,5 @@
 """What the study measured, as the report uses it: per scenario the makespans of all contenders on the same missions."""
 
-import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lalliance_agents.errors import UserError
-from lalliance_study.experiments.manifest import FILE, FORMAT, Asked, Manifest
+from lalliance_study.experiments.manifest import FILE, Asked, Manifest
 from lalliance_study.experiments.plan import parts
 from lalliance_study.experiments.presets import preset
 from lalliance_study.experiments.rows import kept, read
@@ -76,8 +75,12 @@ class Results:
             UserError: it is no study, or one of another version.
         """
         self.folder = folder
-        _check_version(folder / FILE)
         self.manifest = Manifest.read(folder)
+        ours = version("lalliance")
+        if self.manifest.lalliance != ours:
+            raise UserError(
+                f"{folder / FILE}: results of lalliance {self.manifest.lalliance}; expected lalliance {ours}"
+            )
         asked = preset(self.manifest.preset)
         same = Manifest.of(asked, self.manifest.missions, self.manifest.seed)
         if (self.manifest.experiments, self.manifest.scenarios) != (same.experiments, same.scenarios):
@@ -138,19 +141,3 @@ class Results:
                 proven=proven[first],
                 shared=shared,
             )
-
-
-def _check_version(path: Path) -> None:
-    """Refuse results of another version, whatever else their manifest says.
-
-    Raises:
-        UserError: they are of another version.
-    """
-    try:
-        found = json.loads(path.read_bytes())
-    except (OSError, ValueError):
-        return  # what is wrong with it is for `Manifest.read` to say
-    ours = {"format": FORMAT, "lalliance": version("lalliance")}
-    for field, value in ours.items():
-        if isinstance(found, dict) and found.get(field, value) != value:
-            raise UserError(f"{path}: results of {field} {found[field]}; expected {field} {value}")
