@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -13,10 +12,12 @@ from support.processes import Processes
 
 from lalliance_agents.errors import UserError
 from lalliance_agents.extras import MissingExtraError
+from lalliance_study.drawing import style, write
 from lalliance_study.report.claims import Claim
+from lalliance_study.report.page import findings, page
 from lalliance_study.report.report import report
 from lalliance_study.report.results import Results
-from lalliance_study.report.sections import CLAIMS, SECTIONS
+from lalliance_study.report.sections import CLAIMS, SECTIONS, Section
 from lalliance_study.scenarios import Scenario
 from mission_control import study_command
 
@@ -29,16 +30,15 @@ def factor(scenario: Scenario, contender: str) -> float:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """The files of the report of a small study, whole."""
-    folder = tmp_path_factory.mktemp("made-up")
-    return made(make_up(folder / "study", factor, missions=4), folder / "report", ["svg"])
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """A small study, whole."""
+    return Results(make_up(tmp_path_factory.mktemp("made-up") / "study", factor, missions=4))
 
 
 @pytest.fixture(scope="module")
-def page(whole: dict[str, bytes]) -> str:
+def text(results: Results) -> str:
     """Its page."""
-    return whole["report.md"].decode()
+    return page(results, findings(results))
 
 
 @pytest.fixture
@@ -56,9 +56,9 @@ def old(tmp_path: Path) -> Path:
     return folder
 
 
-def made(study: Path, out: Path, forms: Sequence[str] = ("png", "svg")) -> dict[str, bytes]:
+def made(study: Path, out: Path) -> dict[str, bytes]:
     """The files of a report."""
-    report(Results(study), out, lambda *_: None, forms)
+    report(Results(study), out, lambda *_: None)
     return {path.name: path.read_bytes() for path in out.iterdir()}
 
 
@@ -71,39 +71,41 @@ def refused(study: Path, old: Path) -> str:
     return str(caught.value)
 
 
-def test_the_same_rows_give_the_same_report(tmp_path: Path) -> None:
-    """Byte by byte."""
-    folder = make_up(tmp_path / "study", factor, missions=4, only=("growth", "rivals"))
-    assert made(folder, tmp_path / "first") == made(folder, tmp_path / "second")
+def test_the_same_rows_give_the_same_report(study: Path, tmp_path: Path) -> None:
+    """Byte by byte, in both forms."""
+    first = made(study, tmp_path / "first")
+    assert first == made(study, tmp_path / "second")
+    assert first.keys() == {"report.md", "growth.png", "growth.svg"}
 
 
-def test_a_report_is_a_page_and_its_figures(whole: dict[str, bytes]) -> None:
-    figures = {f"{one.name}.svg" for section in SECTIONS for one in section.drawings}
-    assert whole.keys() == {"report.md", *figures}
+@pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.name)
+def test_each_section_draws_its_figures(section: Section, results: Results, tmp_path: Path) -> None:
+    own = results.of(section.experiment)
+    with style():
+        paths = write({one.name: one.draw(own) for one in section.drawings}, tmp_path, ["svg"])
+    assert all(path.stat().st_size for path in paths)
 
 
-def test_the_page_begins_with_the_claims_and_leads_to_each(page: str) -> None:
-    heads = re.findall(r"^## (.*)$", page, re.MULTILINE)
-    assert heads[0] == "Claims and verdicts"
+def test_the_page_begins_with_the_claims_and_leads_to_each(text: str) -> None:
+    assert next(re.finditer(r"^## (.*)$", text, re.MULTILINE))[1] == "Claims and verdicts"
     for claim in CLAIMS:
-        assert f"](#{claim.key.lower()})" in page
-        assert f'<a name="{claim.key.lower()}"></a>' in page
-    assert "$" not in page
+        assert f"](#{claim.key.lower()})" in text
+        assert f'<a name="{claim.key.lower()}"></a>' in text
+    assert "$" not in text
 
 
-def test_every_figure_of_the_page_is_there(whole: dict[str, bytes], page: str) -> None:
-    shown = re.findall(r"\]\(([^)#]+\.png)\)", page)
-    assert len(shown) == sum(len(section.drawings) for section in SECTIONS)
-    assert {name.replace(".png", ".svg") for name in shown} <= whole.keys()
+def test_the_page_shows_every_figure(text: str) -> None:
+    shown = re.findall(r"\]\(([^)#]+)\.png\)", text)
+    assert shown == [one.name for section in SECTIONS for one in section.drawings]
 
 
-def test_too_few_missions_are_said_to_be_too_few(page: str) -> None:
-    assert "4 missions a scenario; a verdict needs 20." in page
-    assert "**reproduced**" not in page
+def test_too_few_missions_are_said_to_be_too_few(text: str) -> None:
+    assert "4 missions a scenario; a verdict needs 20." in text
+    assert "**reproduced**" not in text
 
 
-def test_missions_that_were_not_finished_are_told(page: str) -> None:
-    assert "| ALLIANCE, set by hand | 100.0% unfinished |" in page
+def test_missions_that_were_not_finished_are_told(text: str) -> None:
+    assert "| ALLIANCE, set by hand | 100.0% unfinished |" in text
 
 
 def test_an_experiment_that_was_not_run_is_said_to_be_missing(study: Path, tmp_path: Path) -> None:
