@@ -122,6 +122,7 @@ class Member:
         for link in self.hears:
             self._keep(link)
             link.reset(now)
+        self.heeded.clear()
         self.process = Process.RUNNING
         self.there = True
         self.incarnation += 1
