@@ -129,10 +129,6 @@ def said(first: str, second: str, ratio: Estimate | None) -> str:
     return f"{first} takes {ratio.value:.3f} ({ratio.low:.3f} to {ratio.high:.3f}) times as long as {second}."
 
 
-def _number(value: float) -> str:
-    return f"{value:g}"
-
-
 def circumstances(scenario: Scenario) -> str:
     """What befalls a team, or what it knows, in words."""
     if scenario.failures:
@@ -152,8 +148,8 @@ def circumstances(scenario: Scenario) -> str:
 PROPERTIES: Mapping[str, Callable[[Scenario], tuple[float, str]]] = {
     "heterogeneity": lambda one: (one.heterogeneity, f"{one.heterogeneity:g} %"),
     "whether all hear of all work": lambda one: (0, "they do" if one.coverage >= one.robots else "they do not"),
-    "coverage": lambda one: (one.coverage, _number(one.coverage)),
-    "tasks per robot": lambda one: (one.tasks / one.robots, _number(one.tasks / one.robots)),
+    "coverage": lambda one: (one.coverage, f"{one.coverage}"),
+    "tasks per robot": lambda one: (one.tasks / one.robots, f"{one.tasks / one.robots:.2g}"),
     "team size": lambda one: (one.robots, f"{one.robots} robots"),
     "how times are spread": lambda one: (0, one.spread.replace("_", "-")),
     "what befalls the team": lambda one: (0, circumstances(one)),
