@@ -74,8 +74,8 @@ class Mishaps:
         if verb is Verb.ACTIVATE:
             self._dies[robot] = now + self._left[robot]
             self._at(self._dies[robot], 0, self._die, robot, self._dies[robot])
-        else:
-            self._left[robot] = self._dies.pop(robot, math.inf) - now
+        elif robot in self._dies:  # of several sets that stop together the first stops the clock (erratum 5, literal)
+            self._left[robot] = self._dies.pop(robot) - now
 
     def _die(self, robot: str, planned: float) -> None:
         if self._dies.get(robot) == planned:

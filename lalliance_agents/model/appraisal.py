@@ -150,7 +150,7 @@ class Appraisal:
             if (
                 self._hearing.is_on(contact, now)
                 and equations.collides(one.active_since, contact.started, self._collision_window)
-                and (contact.expected, contact.robot) < (one.expected, me)
+                and equations.gives_way(one.expected, contact.expected, contact.robot < me)
             ):
                 return contact.robot
         return None

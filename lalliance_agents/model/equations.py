@@ -61,6 +61,61 @@ def task_time(samples: Sequence[float], floor: float = 0.0) -> float:
     return max(mean + math.sqrt(squares / len(samples)), floor)
 
 
+def presumed_time(longest: float, initial: float, floor: float) -> float:
+    """The own task time while it is unknown (erratum 10), in seconds.
+
+    Args:
+        longest: the largest time measured of anybody for any task, in seconds; 0 if there is none.
+        initial: what it is taken to be then, in seconds.
+        floor: what a failed attempt has taught it to be at least (erratum 13), in seconds.
+    """
+    return max(longest if longest > 0.0 else initial, floor)
+
+
+def is_bound(time: float, floor: float) -> bool:
+    """Whether a time is but the lower bound that a failed attempt has left (erratum 13)."""
+    return floor > 0.0 and time <= floor
+
+
+def censored(floor: float, factor: float, elapsed: float) -> float:
+    """The lower bound of a time after one more failed attempt of `elapsed` seconds (erratum 13), in seconds."""
+    return max(floor, factor * elapsed)
+
+
+def credited(started: float, ended: float) -> float:
+    """The sample that an attempt leaves which has done its task, in seconds: never 0."""
+    return max(ended - started, SLACK)
+
+
+def leaves_no_trace(elapsed: float, window: float) -> bool:
+    """Whether an attempt is so short that it may have ended in a collision (erratum 15): it is as if it had never been."""
+    return not more_than(elapsed, window)
+
+
+def may_have_done(elapsed: float, window: float, there: bool) -> bool:
+    """Whether an attempt that is known at a task's completion may have done it (erratum 14).
+
+    Args:
+        elapsed: its length as far as it was heard, in seconds.
+        window: an attempt no longer than this may have ended in a collision, in seconds.
+        there: whether its robot is still heard on the task.
+    """
+    return more_than(elapsed, window) or there
+
+
+def goes_on(active_for: float, active_for_before: float, last: float, now: float, tau: float) -> bool:
+    """Whether a message belongs to an attempt: not to one begun after it, and not to one begun while nothing was heard.
+
+    Args:
+        active_for: how long its robot says to have been active, in seconds.
+        active_for_before: what it said in the message before, in seconds.
+        last: when that came, in seconds.
+        now: when this one came, in seconds.
+        tau: the silence timeout, in seconds.
+    """
+    return active_for >= active_for_before - SLACK and not more_than(now - active_for, last + tau)
+
+
 def task_category(
     own_time: float, best_time: float, anybody_on_task: bool, knows_teammates: bool, ordering: Ordering
 ) -> int:
@@ -203,6 +258,70 @@ def acquiescence(active_for: float, psi: float, contender: bool, lambda_: float)
 def collides(own_start: float, their_start: float, window: float) -> bool:
     """Whether two starts of the same task are so close that neither could know of the other (erratum 15)."""
     return abs(own_start - their_start) <= window + SLACK
+
+
+def gives_way(expected: float, their_expected: float, they_come_first: bool) -> bool:
+    """Whether a robot gives way to one that started the same task with it (erratum 15).
+
+    Args:
+        expected: the time it announced to need, in seconds.
+        their_expected: the time the other one announced, in seconds.
+        they_come_first: whether the other's name comes first, which decides between equals.
+    """
+    return their_expected < expected or (their_expected == expected and they_come_first)
+
+
+def occasion(lapsed: bool, present: bool) -> int:
+    """Why a task on which somebody was heard can be taken: the place of the cause in `OCCASIONS` of `events`.
+
+    Args:
+        lapsed: whether the teammate that was heard last on the task is not heard on it any more.
+        present: whether it is heard at all.
+    """
+    if not lapsed:
+        return 1
+    return 2 if present else 3
+
+
+def reason_to_stop(
+    complete: bool,
+    sensory_feedback: int,
+    body_failed: bool,
+    rival: bool,
+    yields: bool,
+    acquiescence: int,
+    impatience_reset: int,
+    learned_robot_influence: int,
+    activity_suppression: int,
+) -> int:
+    """Why an active set stops, of several reasons the first: its place in `REASONS_TO_STOP` of `events`; -1 if it goes on.
+
+    Args:
+        complete: whether the task is complete.
+        sensory_feedback: a factor.
+        body_failed: whether the robot's own code ended with an error.
+        rival: whether it gives way to a teammate that started with it (erratum 15).
+        yields: whether acquiescence is 0 because of a contender.
+        acquiescence: a factor, like all that follow.
+        impatience_reset: see there.
+        learned_robot_influence: see there.
+        activity_suppression: 0 if another set is active too (erratum 5, literal).
+    """
+    reasons = (
+        complete,
+        sensory_feedback == 0,
+        body_failed,
+        rival,
+        yields,
+        acquiescence == 0,
+        impatience_reset == 0,
+        learned_robot_influence == 0,
+        activity_suppression == 0,
+    )
+    for place in range(len(reasons)):
+        if reasons[place]:
+            return place
+    return -1
 
 
 def motivation(

@@ -84,6 +84,42 @@ class Cause(StrEnum):
     NOT_BEST = "not_best"  # drop: erratum 1, literal
     SUPPRESSED = "suppressed"  # drop: erratum 5, literal
 
+    @property
+    def verb(self) -> Verb:
+        """What is decided for this cause."""
+        return Verb.ACTIVATE if self in OCCASIONS else _VERBS.get(self, Verb.DROP)
+
+    @property
+    def is_blameless(self) -> bool:
+        """Whether an attempt that ends for this cause has not failed."""
+        return self in _BLAMELESS
+
+
+#: Why a set starts: the first where no teammate was heard on the task in this trial.
+OCCASIONS = (Cause.FREE, Cause.IMPATIENCE, Cause.RELEASED, Cause.SILENCE)
+
+#: Why a set stops by itself: of several reasons the first counts.
+REASONS_TO_STOP = (
+    Cause.SENSED,
+    Cause.INAPPLICABLE,
+    Cause.BODY_FAILED,
+    Cause.COLLISION,
+    Cause.CONTENDER,
+    Cause.NO_SUCCESS,
+    Cause.RESET,
+    Cause.NOT_BEST,
+    Cause.SUPPRESSED,
+)
+
+_VERBS = {
+    Cause.SENSED: Verb.COMPLETE,
+    Cause.COLLISION: Verb.YIELD,
+    Cause.CONTENDER: Verb.YIELD,
+    Cause.NO_SUCCESS: Verb.GIVE_UP,
+}
+
+_BLAMELESS = {Cause.COLLISION, Cause.INAPPLICABLE, Cause.NEW_TRIAL, Cause.NOT_BEST, Cause.SUPPRESSED}
+
 
 class Pace(StrEnum):
     """Which rate a motivation grows with."""

@@ -9,7 +9,7 @@ that it failed at one task would want it as much as another.
 import math
 from collections.abc import Mapping, Sequence
 
-from lalliance_agents.model.equations import scale_factor
+from lalliance_agents.model.equations import is_bound, presumed_time, scale_factor
 from lalliance_agents.model.monitor import Monitor, Record
 from lalliance_agents.model.parameters import Erratum, Parameters
 
@@ -33,7 +33,7 @@ class Knowledge:
         self.version = 0
         self._seen = -1
         self._low = self._high = math.nan
-        self._fallback = parameters.initial_task_time
+        self._longest = 0.0
         self._knows_teammates = False
         for monitor in self.monitors.values():
             monitor.on_change = self._changed
@@ -46,8 +46,7 @@ class Knowledge:
             return
         self._seen = self.version
         extents = [monitor.extent() for monitor in self.monitors.values()]
-        longest = max((extent.longest for extent in extents), default=0.0)
-        self._fallback = longest if longest > 0.0 else self._parameters.initial_task_time
+        self._longest = max((extent.longest for extent in extents), default=0.0)
         own = [time for time in map(self.own_time, self.monitors) if not math.isnan(time)]
         low = min([extent.low for extent in extents] + own, default=math.inf)
         high = max([extent.high for extent in extents] + own, default=-math.inf)
@@ -63,12 +62,11 @@ class Knowledge:
         if self._undefined_if_unknown:
             return math.nan
         self._read()
-        return max(self._fallback, monitor.floor(self._me))
+        return presumed_time(self._longest, self._parameters.initial_task_time, monitor.floor(self._me))
 
     def has_failed(self, task: str) -> bool:
         """Whether the own time is but the lower bound that a failed attempt has left (erratum 13)."""
-        floor = self.monitors[task].floor(self._me)
-        return floor > 0.0 and self.own_time(task) <= floor
+        return is_bound(self.own_time(task), self.monitors[task].floor(self._me))
 
     def best_time(self, task: str, present: Sequence[str]) -> float:
         """The least task time of the robots present, this one included (erratum 3), in seconds; else infinity."""

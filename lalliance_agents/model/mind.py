@@ -17,6 +17,8 @@ from collections.abc import Callable, Collection, Sequence
 from lalliance_agents.model import equations
 from lalliance_agents.model.appraisal import Appraisal, Moment
 from lalliance_agents.model.events import (
+    OCCASIONS,
+    REASONS_TO_STOP,
     Activate,
     Announce,
     BodyFailed,
@@ -31,7 +33,6 @@ from lalliance_agents.model.events import (
     RosterKnown,
     Sensed,
     TrialStarted,
-    Verb,
 )
 from lalliance_agents.model.hearing import Hearing
 from lalliance_agents.model.knowledge import Knowledge
@@ -39,16 +40,6 @@ from lalliance_agents.model.listening import Listener, News
 from lalliance_agents.model.motivation import Motivation
 from lalliance_agents.model.outlook import AT_ONCE, Outlook
 from lalliance_agents.model.parameters import EARLY, SLACK, Architecture, Erratum, Learning, Parameters
-
-#: Ends of an attempt after which the robot is not held to have failed.
-_BLAMELESS = {Cause.COLLISION, Cause.INAPPLICABLE, Cause.NEW_TRIAL, Cause.NOT_BEST, Cause.SUPPRESSED}
-
-_VERBS = {
-    Cause.SENSED: Verb.COMPLETE,
-    Cause.COLLISION: Verb.YIELD,
-    Cause.CONTENDER: Verb.YIELD,
-    Cause.NO_SUCCESS: Verb.GIVE_UP,
-}
 
 
 class Mind:
@@ -309,34 +300,36 @@ class Mind:
         yields = equations.acquiescence(one.active_for(now), factors.psi, contender is not None, math.inf) == 0
         if factors.is_open and not (one.complete or one.body_failed or yields or rival is not None):
             return None, None
-        reasons: list[tuple[bool, Cause, str | None]] = [
-            (one.complete, Cause.SENSED, None),
-            (factors.sensory_feedback == 0, Cause.INAPPLICABLE, None),
-            (one.body_failed, Cause.BODY_FAILED, None),
-            (rival is not None, Cause.COLLISION, rival),
-            (yields, Cause.CONTENDER, contender),
-            (factors.acquiescence == 0, Cause.NO_SUCCESS, None),
-            (factors.impatience_reset == 0, Cause.RESET, contender),
-            (factors.learned_robot_influence == 0, Cause.NOT_BEST, None),
-            (factors.activity_suppression == 0, Cause.SUPPRESSED, None),
-        ]
-        return next(((cause, other) for holds, cause, other in reasons if holds), (None, None))
+        reason = equations.reason_to_stop(
+            one.complete,
+            factors.sensory_feedback,
+            one.body_failed,
+            rival is not None,
+            yields,
+            factors.acquiescence,
+            factors.impatience_reset,
+            factors.learned_robot_influence,
+            factors.activity_suppression,
+        )
+        others = {Cause.COLLISION: rival, Cause.CONTENDER: contender, Cause.RESET: contender}
+        cause = REASONS_TO_STOP[reason]
+        return cause, others.get(cause)
 
     def _stop(self, one: Motivation, now: float, cause: Cause, other: str | None) -> Decision:
-        decision = self._decision(one, now, _VERBS.get(cause, Verb.DROP), cause, other)
+        decision = self._decision(one, now, cause, other)
         if cause is not Cause.SENSED:
-            self.knowledge.monitors[one.task].ceased(now, failed=cause not in _BLAMELESS)
+            self.knowledge.monitors[one.task].ceased(now, failed=not cause.is_blameless)
         one.deactivate(now)
         one.factors = decision.factors.having(0.0)
         if not self._bored_at_work:
             self._idle_since = now
         return decision
 
-    def _decision(self, one: Motivation, now: float, verb: Verb, cause: Cause, other: str | None) -> Decision:
+    def _decision(self, one: Motivation, now: float, cause: Cause, other: str | None) -> Decision:
         factors = one.factors
         assert factors is not None  # noqa: S101 - a set is appraised before anything is decided about it
         teammates = self._appraisal.teammates(one.task, now)
-        return Decision(now, verb, one.task, cause, factors, teammates, one.active_for(now), other)
+        return Decision(now, cause.verb, one.task, cause, factors, teammates, one.active_for(now), other)
 
     def _activate(self, now: float) -> list[Command]:
         """Erratum 5: incumbent first, then the highest motivation, then the lowest task index."""
@@ -358,7 +351,7 @@ class Mind:
 
     def _start(self, one: Motivation, now: float) -> Decision:
         cause, other = self._occasion(one.task, now)
-        decision = self._decision(one, now, Verb.ACTIVATE, cause, other)
+        decision = self._decision(one, now, cause, other)
         one.activate(now, self._appraisal.expected_time(one.task))
         self.knowledge.monitors[one.task].began(now)
         return decision
@@ -369,9 +362,7 @@ class Mind:
         if not teammates:
             return Cause.FREE, None
         latest = teammates[0]
-        if latest.lapsed_at is None:
-            return Cause.IMPATIENCE, latest.robot
-        return (Cause.RELEASED if latest.present else Cause.SILENCE), latest.robot
+        return OCCASIONS[equations.occasion(latest.lapsed_at is not None, latest.present)], latest.robot
 
     @property
     def broadcast_due(self) -> float:

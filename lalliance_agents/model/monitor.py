@@ -16,8 +16,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from lalliance_agents.model.equations import more_than, task_time
-from lalliance_agents.model.parameters import SLACK, Erratum, Parameters
+from lalliance_agents.model.equations import (
+    censored,
+    credited,
+    goes_on,
+    leaves_no_trace,
+    may_have_done,
+    more_than,
+    task_time,
+)
+from lalliance_agents.model.parameters import Erratum, Parameters
 
 
 class Record(NamedTuple):
@@ -105,18 +113,13 @@ class Monitor:
     def observe(self, robot: str, now: float, active_for: float) -> bool:
         """`robot` is on the task since `active_for` seconds; whether this is a new attempt of it."""
         attempt = self._attempts.get(robot)
-        if attempt is not None and self._goes_on(attempt, now, active_for):
+        if attempt is not None and goes_on(active_for, attempt.active_for, attempt.last, now, self._tau):
             attempt.last, attempt.active_for, attempt.left = now, active_for, None
             return False
         if attempt is not None:
             self._fail(robot, attempt)
         self._attempts[robot] = Attempt(now - active_for, now, active_for)
         return True
-
-    def _goes_on(self, attempt: Attempt, now: float, active_for: float) -> bool:
-        """Whether a message belongs to `attempt`: not one begun after it, and not one begun while nothing was heard."""
-        begun_later = more_than(now - active_for, attempt.last + self._tau)
-        return active_for >= attempt.active_for - SLACK and not begun_later
 
     def elsewhere(self, robot: str, now: float) -> None:
         """`robot` was heard idle or on another task: it has left this one, or the task is complete."""
@@ -145,8 +148,9 @@ class Monitor:
     def continued(self, robot: str, now: float, active_for: float) -> Attempt | None:
         """The attempt that a message of `robot`, on the task since `active_for` seconds, goes on with, if there is one."""
         attempt = self._attempts.get(robot)
-        goes_on = attempt is not None and attempt.left is None and self._goes_on(attempt, now, active_for)
-        return attempt if goes_on else None
+        if attempt is None or attempt.left is not None:
+            return None
+        return attempt if goes_on(active_for, attempt.active_for, attempt.last, now, self._tau) else None
 
     def began(self, now: float) -> None:
         """The robot itself begins an attempt."""
@@ -173,7 +177,7 @@ class Monitor:
         alone = self._only_attempt(silent)
         for robot, attempt in list(self._attempts.items()):
             if robot == alone or (self._credits_all and robot not in silent):
-                self._sample(robot, (now if attempt.left is None else attempt.left) - attempt.started)
+                self._sample(robot, credited(attempt.started, now if attempt.left is None else attempt.left))
             elif robot in silent:
                 self._fail(robot, attempt)
         self._attempts.clear()
@@ -183,7 +187,7 @@ class Monitor:
         lasting = [
             robot
             for robot, one in self._attempts.items()
-            if more_than(one.last - one.started, self._collision) or (one.left is None and robot not in silent)
+            if may_have_done(one.last - one.started, self._collision, one.left is None and robot not in silent)
         ]
         candidates = lasting or list(self._attempts)
         return candidates[0] if len(candidates) == 1 and self._earlier == 0 else None
@@ -192,18 +196,18 @@ class Monitor:
         """End an attempt without completion; a `short` one that may have ended in a collision is as if it had never been."""
         del self._attempts[robot]
         elapsed = attempt.last - attempt.started
-        if short and not more_than(elapsed, self._collision):
+        if short and leaves_no_trace(elapsed, self._collision):
             return
         self._earlier += 1
         if failed and self._remembers_failures:
             known = self._of(robot)
-            known.floor = max(known.floor, self._failure_factor * elapsed)
+            known.floor = censored(known.floor, self._failure_factor, elapsed)
             known.floor_left = self._trials
             self._changed(known)
 
     def _sample(self, robot: str, duration: float) -> None:
         known = self._of(robot)
-        known.samples.append(max(duration, SLACK))
+        known.samples.append(duration)
         known.floor_left = max(known.floor_left - 1, 0)
         if known.floor_left == 0:
             known.floor = 0.0
