@@ -6,11 +6,12 @@ they are made known to the compiler as they stand, so that the kernel calls the 
 There is no cache on disk: it would not notice a change of another module. There is no `fastmath`: it would change results.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import FunctionType
 from typing import Any, ParamSpec, TypeVar
 
 import numba
+from numba.core import types
 from numba.extending import register_jitable
 
 from lalliance_agents.model import equations
@@ -23,31 +24,31 @@ Memory = Any
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
-    """The function, compiled at its first call. A division by 0 gives an infinity, as in C."""
-    made: Callable[P, R] = numba.njit(nogil=True, error_model="numpy")(function)
-    return made
+    """The function, compiled when a compiled function first calls it. A division by 0 gives an infinity, as in C."""
+    return _made(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """The same for a small function that is called all the time, put in the place of each call."""
-    made: Callable[P, R] = numba.njit(nogil=True, error_model="numpy", forceinline=True)(function)
-    return made
+    return _made(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
 
 
-def in_threads(function: Callable[P, R]) -> Callable[P, R]:
-    """The same for a function whose `each` loops are shared out among threads."""
-    made: Callable[P, R] = numba.njit(nogil=True, error_model="numpy", parallel=True)(function)
-    return made
+def entrance(function: Callable[P, R]) -> Callable[P, R]:
+    """The same for a function that Python calls, in any number of threads at a time."""
+    return _made(function, nogil=True)
 
 
-#: `range`, and inside a function `in_threads` a range whose passes run in parallel.
-each: type[range] = numba.prange
+def _made(function: Callable[P, R], **options: bool) -> Callable[P, R]:
+    made = numba.njit(error_model="numpy", **options)(function)
+    typed = made.get_call_template
 
+    def of_kind(arguments: Sequence[types.Type], named: dict[str, types.Type]) -> Any:
+        # Without this a function is compiled anew for each number that is written out in a call.
+        return typed([types.unliteral(one) for one in arguments], named)
 
-def set_threads(count: int) -> None:
-    """How many threads `in_threads` may use; the machine may have fewer."""
-    most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
-    numba.set_num_threads(min(count, most))
+    made.get_call_template = of_kind
+    compiles: Callable[P, R] = made
+    return compiles
 
 
 for _formula in vars(equations).values():

@@ -9,11 +9,11 @@ half a control step. `rules_of` says what else it cannot run.
 """
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from lalliance_study.compiled import Memory, compiled, each, in_threads, set_threads
-from lalliance_study.kernel_explore import explore
+from lalliance_study.compiled import Memory, compiled, entrance
 from lalliance_study.kernel_hearing import (
     arrive,
     beat_until,
@@ -21,14 +21,11 @@ from lalliance_study.kernel_hearing import (
     hush,
     instant,
     last_beat,
-    say,
     wake_by,
 )
 from lalliance_study.kernel_load import load, next_trial
-from lalliance_study.kernel_mind import lay_down, take_up, think_active, think_idle
 from lalliance_study.kernel_state import (
     HEAR,
-    IDLE,
     INFINITY,
     LINE,
     NEVER,
@@ -40,39 +37,9 @@ from lalliance_study.kernel_state import (
     in_memory,
     new_teams,
 )
+from lalliance_study.kernel_steps import make_step
 from lalliance_study.kernel_world import act, die, leave, publish, turn
 from lalliance_study.scenarios import Missions
-
-
-@compiled
-def _note(w: Memory, log: np.ndarray, robot: int, task: int, cause: int) -> None:
-    if w.lines < log.shape[0]:
-        line = log[w.lines]
-        line["at"] = w.now
-        line["robot"] = robot
-        line["task"] = task
-        line["cause"] = cause
-    w.lines += 1
-
-
-@compiled
-def _step(w: Memory, rules: Rules, log: np.ndarray, robot: int, step: int) -> None:
-    """One control step of a robot."""
-    if step >= w.r_wake[robot]:
-        if w.r_active[robot] >= 0:
-            cause = think_active(w, rules, robot, step)
-            if cause >= 0:
-                _note(w, log, robot, w.r_active[robot], cause)
-                lay_down(w, rules, robot, cause, step)
-        else:
-            at = explore(w, rules, robot, step) if w.exploring else think_idle(w, rules, robot, step)
-            if at >= 0:
-                cause = take_up(w, rules, robot, at, step)
-                _note(w, log, robot, w.p_task[at], cause)
-    if step >= w.r_idle_step[robot]:
-        w.r_idle_step[robot] = NEVER
-        say(w, rules, robot, IDLE, step)
-        w.r_due[robot] += rules.period
 
 
 @compiled
@@ -156,7 +123,7 @@ def run_one(w: Memory, rules: Rules, missions: Missions, number: int, log: np.nd
         earliest = min(soon_at, act_at, world_at, special_at)
         if step_at < earliest:
             w.now = step_at
-            _step(w, rules, log, robot, step)
+            make_step(w, rules, log, robot, step)
             continue
         w.now = earliest
         if act_at == earliest:
@@ -183,24 +150,21 @@ def _result(w: Memory, result: np.ndarray) -> None:
     result[4] = w.lines
 
 
-@compiled
-def _run_share(
-    team: Memory, laws: Memory, missions: Missions, results: np.ndarray, log: np.ndarray, first: int, stride: int
+@entrance
+def _run_some(
+    team: Memory, laws: Memory, missions: Missions, results: np.ndarray, log: np.ndarray, first: int, until: int
 ) -> None:
     w, rules = team[0], laws[0]
-    for number in range(first, len(results), stride):
+    for number in range(first, until):
         run_one(w, rules, missions, number, log)
         _result(w, results[number])
 
 
-@in_threads
-def _run_shares(teams: Memory, laws: Memory, missions: Missions, results: np.ndarray, log: np.ndarray) -> None:
-    for share in each(len(teams)):
-        _run_share(teams[share : share + 1], laws, missions, results, log, share, len(teams))
-
-
 RESULTS = ("makespan", "activations", "takeovers", "sent", "decisions")
 """What is kept of a mission: seconds (NaN where the deadline came first), and counts."""
+
+#: Missions that a thread takes at a time.
+AT_ONCE = 100
 
 _NO_LOG = np.zeros(0, LINE)
 
@@ -208,15 +172,21 @@ _NO_LOG = np.zeros(0, LINE)
 def run_missions(rules: Rules, missions: Missions) -> np.ndarray:
     """Run all missions in this thread: [count, len(RESULTS)]."""
     results = np.zeros((len(missions.able), len(RESULTS)))
-    _run_share(new_teams(1), in_memory(rules), missions, results, _NO_LOG, 0, 1)
+    _run_some(new_teams(1), in_memory(rules), missions, results, _NO_LOG, 0, len(results))
     return results
 
 
 def run_in_threads(rules: Rules, missions: Missions, threads: int) -> np.ndarray:
     """The same in several threads, with the same result."""
     results = np.zeros((len(missions.able), len(RESULTS)))
-    set_threads(threads)
-    _run_shares(new_teams(threads), in_memory(rules), missions, results, _NO_LOG)
+    laws, firsts = in_memory(rules), iter(range(0, len(results), AT_ONCE))
+
+    def work(team: Memory) -> None:
+        for first in firsts:  # whichever thread is free takes the next
+            _run_some(team, laws, missions, results, _NO_LOG, first, min(first + AT_ONCE, len(results)))
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, [new_teams(1) for _ in range(threads)]))
     return results
 
 
@@ -227,7 +197,7 @@ def run_logged(
     teams, log = new_teams(1), np.zeros(lines, LINE)
     only = Missions._make(part[number : number + 1] for part in missions)
     results = np.zeros((1, len(RESULTS)))
-    _run_share(teams, in_memory(rules), only, results, log, 0, 1)
+    _run_some(teams, in_memory(rules), only, results, log, 0, 1)
     w = teams[0]
     ends = np.array([w.t_ends[task] if w.t_closed[task] else np.nan for task in range(int(w.m))])
     return results[0], log[: int(w.lines)], ends - float(w.began)

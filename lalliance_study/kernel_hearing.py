@@ -9,7 +9,15 @@ See `hearing`, `listening` and `monitor` in the model for what is kept and why.
 
 import math
 
-from lalliance_agents.model.equations import more_than, task_time
+from lalliance_agents.model.equations import (
+    censored,
+    credited,
+    goes_on,
+    leaves_no_trace,
+    may_have_done,
+    more_than,
+    task_time,
+)
 from lalliance_agents.model.parameters import SLACK
 from lalliance_study.compiled import Memory, compiled, inlined
 from lalliance_study.kernel_state import HEAR, IDLE, INFINITY, NEVER, NOTHING, ROBOTS, SAMPLES, TASKS, Rules
@@ -142,11 +150,11 @@ def fail(w: Memory, rules: Rules, hearer: int, pair: int, failed: bool, short: b
     if w.q_a_left[pair] < INFINITY:
         w.p_leavers[w.q_at[pair]] -= 1
     elapsed = w.q_a_last[pair] - w.q_a_started[pair]
-    if short and not more_than(elapsed, rules.collision_window):
+    if short and leaves_no_trace(elapsed, rules.collision_window):
         return
     w.p_earlier[w.q_at[pair]] += 1
     if failed and rules.remembers_failures:
-        w.q_floor[pair] = max(w.q_floor[pair], rules.failure_factor * elapsed)
+        w.q_floor[pair] = censored(w.q_floor[pair], rules.failure_factor, elapsed)
         w.q_floor_left[pair] = rules.trials
         refresh(w, hearer, pair)
 
@@ -159,7 +167,7 @@ def _sample(w: Memory, rules: Rules, hearer: int, pair: int, duration: float) ->
         for index in range(first, first + rules.trials - 1):
             w.samples[index] = w.samples[index + 1]
         w.q_count[pair] -= 1
-    w.samples[first + w.q_count[pair]] = max(duration, SLACK)
+    w.samples[first + w.q_count[pair]] = duration
     w.q_count[pair] += 1
     w.q_floor_left[pair] = max(w.q_floor_left[pair] - 1, 0)
     if w.q_floor_left[pair] == 0:
@@ -205,8 +213,8 @@ def completed(w: Memory, rules: Rules, hearer: int, task: int, now: float) -> No
         silent = more_than(now - w.q_a_last[pair], rules.tau)
         any_attempt += 1
         one_of_any = pair
-        long = more_than(w.q_a_last[pair] - w.q_a_started[pair], rules.collision_window)
-        if long or (left == INFINITY and not silent):
+        elapsed = w.q_a_last[pair] - w.q_a_started[pair]
+        if may_have_done(elapsed, rules.collision_window, left == INFINITY and not silent):
             lasting += 1
             one = pair
     if lasting == 0:
@@ -219,7 +227,7 @@ def completed(w: Memory, rules: Rules, hearer: int, task: int, now: float) -> No
         silent = more_than(now - w.q_a_last[pair], rules.tau)
         if pair == one or (rules.credits_all and not silent):
             ended = now if w.q_a_left[pair] == INFINITY else w.q_a_left[pair]
-            _sample(w, rules, hearer, pair, ended - w.q_a_started[pair])
+            _sample(w, rules, hearer, pair, credited(w.q_a_started[pair], ended))
         elif silent:
             fail(w, rules, hearer, pair, True, True)
         w.q_trying[pair] = 0
@@ -251,8 +259,7 @@ def _observe(w: Memory, rules: Rules, hearer: int, pair: int, now: float, length
     if w.p_leavers[w.q_at[pair]] > 0:
         settle(w, rules, hearer, w.q_at[pair], last_step(w, rules, hearer, now))
     if w.q_trying[pair]:
-        begun_later = more_than(now - length, w.q_a_last[pair] + rules.tau)
-        if length >= w.q_a_length[pair] - SLACK and not begun_later:
+        if goes_on(length, w.q_a_length[pair], w.q_a_last[pair], now, rules.tau):
             if w.q_a_left[pair] < INFINITY:
                 w.p_leavers[w.q_at[pair]] -= 1
             w.q_a_last[pair] = now

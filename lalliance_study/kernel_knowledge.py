@@ -12,16 +12,26 @@ from lalliance_study.compiled import Memory, compiled, inlined
 from lalliance_study.kernel_state import INFINITY, ROBOTS, TASKS, Rules
 
 in_window = equations.in_window
+is_bound = equations.is_bound
 patience = equations.patience
+presumed_time = equations.presumed_time
 scale_factor = equations.scale_factor
 
 
 @inlined
-def own_time(w: Memory, robot: int, at: int) -> float:
+def own_time(w: Memory, rules: Rules, robot: int, at: int) -> float:
     """Knowledge.own_time, of the robot at the place `at`."""
     pair = at * w.width + w.p_mine[at]
     known: float = w.q_time[pair]
-    return max(w.r_fallback[robot], w.q_floor[pair]) if math.isnan(known) else known
+    if math.isnan(known) and rules.replaces_unknown:
+        return presumed_time(w.r_longest[robot], rules.initial_task_time, w.q_floor[pair])
+    return known
+
+
+@inlined
+def expects_best(w: Memory, robot: int, at: int, own: float) -> bool:
+    """Whether a robot may expect to be best at all: it knows its teammates, and its own time is no mere bound."""
+    return w.r_knows[robot] == 1 and not is_bound(own, w.q_floor[at * w.width + w.p_mine[at]])
 
 
 @compiled
@@ -41,14 +51,15 @@ def read(w: Memory, rules: Rules, robot: int) -> None:
                 low, high = min(low, time), max(high, time)
                 longest = max(longest, w.q_measured[first + place])
                 knows = knows or place != mine
-    w.r_fallback[robot] = longest if longest > 0.0 else rules.initial_task_time
+    w.r_longest[robot] = longest
     for index in range(w.r_sets[robot]):
         task = w.set_task[robot * TASKS + index]
-        own = own_time(w, robot, task * w.width + w.place[robot * TASKS + task])
-        low, high = min(low, own), max(high, own)
+        own = own_time(w, rules, robot, task * w.width + w.place[robot * TASKS + task])
+        if not math.isnan(own):
+            low, high = min(low, own), max(high, own)
     w.r_low[robot], w.r_high[robot] = low, high
     w.r_scale[robot] = scale_factor(rules.min_delay, rules.max_delay, low, high)
-    w.r_knows[robot] = knows
+    w.r_knows[robot] = knows or not rules.replaces_unknown
 
 
 @compiled
@@ -60,7 +71,7 @@ def who_is_present(w: Memory, rules: Rules, robot: int, now: float) -> float:
         couple = robot * ROBOTS + mate
         w.present[mate] = 1
         if w.k_live[couple] == 0:
-            if in_window(w.k_last[couple], now - rules.tau, max(now, w.k_last[couple]), True):
+            if in_window(w.k_last[couple], now - rules.tau, INFINITY, rules.closed):
                 lapse = min(lapse, w.k_last[couple] + rules.tau)
             else:
                 w.present[mate] = 0
@@ -93,7 +104,14 @@ def is_on(w: Memory, rules: Rules, pair: int, now: float) -> bool:
     """Hearing.is_on: whether the speaker of `pair` was heard on the task within tau."""
     if w.q_met_on[pair] == 0:
         return False
-    return is_live(w, pair) or in_window(w.q_c_last[pair], now - rules.tau, max(now, w.q_c_last[pair]), True)
+    return is_live(w, pair) or in_window(w.q_c_last[pair], now - rules.tau, INFINITY, rules.closed)
+
+
+@inlined
+def beginning(w: Memory, rules: Rules, pair: int) -> float:
+    """Hearing.beginning: the instant with which windows begin that look back to the first message."""
+    first: float = w.q_c_since[pair] if rules.per_attempt else w.q_c_first[pair]
+    return first
 
 
 @inlined

@@ -23,7 +23,7 @@ def _load_robot(w: Memory, rules: Rules, missions: Missions, number: int, robot:
     w.r_mates[robot] = 0
     w.r_sets[robot] = 0
     w.r_stale[robot] = 1
-    w.r_fallback[robot] = rules.initial_task_time
+    w.r_longest[robot] = 0.0
     w.r_dies[robot] = INFINITY
     for other in range(w.n):
         w.k_met[robot * ROBOTS + other] = 0
@@ -103,6 +103,7 @@ def _find_mates(w: Memory) -> None:
 def _begin_robot(w: Memory, rules: Rules, robot: int) -> None:
     """Mind._begin_trial, and a body at rest."""
     w.r_active[robot] = -1
+    w.r_crowd[robot] = 0
     w.r_idle_since[robot] = w.born
     w.r_contended[robot] = 0
     w.r_waiting[robot] = rules.beats
@@ -148,6 +149,7 @@ def _begin_task(w: Memory, task: int) -> None:
         w.p_since[at] = w.born
         w.p_growth[at] = 0.0
         w.p_complete[at] = 0
+        w.p_active[at] = 0
         w.p_earlier[at] = 0
         w.p_leavers[at] = 0
         for pair in range(at * w.width, (at + 1) * w.width):

@@ -23,7 +23,9 @@ from lalliance_study.kernel_hearing import (
     step_from,
 )
 from lalliance_study.kernel_knowledge import (
+    beginning,
     best_time,
+    expects_best,
     is_live,
     is_on,
     own_time,
@@ -31,22 +33,7 @@ from lalliance_study.kernel_knowledge import (
     read,
     who_is_present,
 )
-from lalliance_study.kernel_state import (
-    COLLISION,
-    CONTENDER,
-    FREE,
-    IMPATIENCE,
-    INFINITY,
-    NEVER,
-    NO_SUCCESS,
-    NOT_BEST,
-    RELEASED,
-    RESET,
-    SENSED,
-    SILENCE,
-    TASKS,
-    Rules,
-)
+from lalliance_study.kernel_state import BLAMELESS, FREE, INFINITY, NEVER, SENSED, TASKS, Rules
 from lalliance_study.kernel_world import act_soon
 
 acquiescence = equations.acquiescence
@@ -54,14 +41,17 @@ boredom = equations.boredom
 collides = equations.collides
 delay_of = equations.delay
 fast_rate = equations.fast_rate
+gives_way = equations.gives_way
 give_up_time = equations.give_up_time
 holds_back = equations.holds_back
 impatience_reset = equations.impatience_reset
 in_window = equations.in_window
 influence = equations.learned_robot_influence
 motivation = equations.motivation
+occasion = equations.occasion
 ramp_reaches = equations.ramp_reaches
 reaches = equations.reaches
+reason_to_stop = equations.reason_to_stop
 slow_rate = equations.slow_rate
 task_category = equations.task_category
 yield_time = equations.yield_time
@@ -112,8 +102,8 @@ def contention(w: Memory, rules: Rules, at: int, now: float, last: float) -> tup
         pair = at * w.width + place
         if place == w.p_mine[at] or w.q_met_on[pair] == 0:
             continue
-        beginning = w.q_c_since[pair] if rules.per_attempt else w.q_c_first[pair]
-        news = news or last < beginning <= now
+        first = beginning(w, rules, pair)
+        news = news or (last < first <= now if rules.closed else in_window(first, last, now, False))
         if is_on(w, rules, pair, now):
             contended = True
             if not is_live(w, pair):
@@ -125,8 +115,8 @@ def contention(w: Memory, rules: Rules, at: int, now: float, last: float) -> tup
 def grow(w: Memory, rules: Rules, robot: int, at: int, now: float, last: float, bored: float) -> float:
     """Mind._grow with Appraisal.adaptive, of a set that is not active; when it changes by itself, in seconds."""
     contended, news, lapse = contention(w, rules, at, now, last)
-    own, floor = own_time(w, robot, at), w.q_floor[at * w.width + w.p_mine[at]]
-    expects = w.r_knows[robot] and not (floor > 0.0 and own <= floor)
+    own = own_time(w, rules, robot, at)
+    expects = expects_best(w, robot, at, own)
     category = task_category(own, best_time(w, rules, at, own), contended, expects, rules.ordering)
     gate = influence(bored, rules.boredom_threshold, category) if rules.learns else 1
     reset = impatience_reset(news)
@@ -141,29 +131,42 @@ def grow(w: Memory, rules: Rules, robot: int, at: int, now: float, last: float, 
         rate, ends = held(w, rules, at, own, now)
     if rate < 0.0:
         rate = fast_of(w, rules, robot, at, category, own)
+    if math.isnan(rate):
+        rate = 0.0  # erratum 10, literal
     return min(lapse, ends, _ramp(w, rules, at, now, last, rate, reset, gate))
+
+
+@inlined
+def sooner(one: float, other: float) -> float:
+    """The lesser of two numbers; the first if the other is none (erratum 10, literal)."""
+    return other if other < one else one
 
 
 @compiled
 def held(w: Memory, rules: Rules, at: int, own: float, now: float) -> tuple[float, float]:
-    """The least delta_slow of those who hold a robot back, -1 if nobody does; and when the first patience ends."""
-    slow, slowest, holding, ends = INFINITY, INFINITY, False, INFINITY
+    """The least delta_slow of those who hold a robot back, -1 if nobody does; and when the first patience ends.
+
+    Erratum 10, literal: a rate may be no number, and so is the least of all if it is that of whom was heard first.
+    """
+    slow, first, undefined, holding, ends = INFINITY, INFINITY, False, False, INFINITY
     for place in range(w.t_able_count[w.p_task[at]]):
         pair = at * w.width + place
         if place == w.p_mine[at] or w.q_met_on[pair] == 0:
             continue
         phi = phi_of(w, rules, pair, own)
         rate = slow_rate(rules.threshold, phi) if rules.learns else rules.hand_slow_rate
-        slowest = min(slowest, rate)
-        beginning = w.q_c_since[pair] if rules.per_attempt else w.q_c_first[pair]
-        if not holds_back(is_on(w, rules, pair, now), in_window(beginning, -math.inf, now - phi, True)):
-            continue
-        holding = True
-        slow = min(slow, rate)
-        ends = min(ends, beginning + phi - SLACK)
+        begins = beginning(w, rules, pair)
+        holds = holds_back(is_on(w, rules, pair, now), in_window(begins, -math.inf, now - phi, rules.closed))
+        if holds:
+            holding = True
+            ends = sooner(ends, begins + phi - SLACK)
+        if holds or rules.slowest_of_all:
+            slow = sooner(slow, rate)
+            if w.q_c_first[pair] < first:
+                first, undefined = w.q_c_first[pair], math.isnan(rate)
     if not holding:
         return -1.0, ends
-    return (slowest if rules.slowest_of_all else slow), ends
+    return (math.nan if undefined else slow), ends
 
 
 @inlined
@@ -179,7 +182,7 @@ def _ramp(w: Memory, rules: Rules, at: int, now: float, last: float, rate: float
         w.p_base[at] = 0.0
         w.p_since[at] = now
         w.p_growth[at] = 0.0
-        return now
+        return now if rate > 0.0 else INFINITY
     ready: float = ramp_reaches(w.p_base[at], w.p_since[at], rate, rules.threshold)
     return ready
 
@@ -196,13 +199,20 @@ def first_of(w: Memory, robot: int, highest: float) -> int:
 
 
 @compiled
+def waits(w: Memory, rules: Rules, robot: int, step: int, now: float, last: float) -> bool:
+    """Whether an idle robot still waits for its roster: all motivations wait at 0."""
+    begin(w, rules, robot, now, last)
+    if w.r_waiting[robot]:
+        w.r_wake[robot] = max(step_from(w, rules, robot, w.born + rules.tau - EARLY), step + 1)
+        return True
+    return False
+
+
+@compiled
 def think_idle(w: Memory, rules: Rules, robot: int, step: int) -> int:
     """The control step of an idle robot; the place of the task that it takes up, or -1."""
     now, last = instant(w, rules, robot, step), before(w, rules, robot, step)
-    begin(w, rules, robot, now, last)
-    if w.r_waiting[robot]:
-        # All motivations wait at 0.
-        w.r_wake[robot] = max(step_from(w, rules, robot, w.born + rules.tau - EARLY), step + 1)
+    if waits(w, rules, robot, step, now, last):
         return -1
     read(w, rules, robot)
     changes = min(who_is_present(w, rules, robot, now), w.r_settle_at[robot])
@@ -223,34 +233,55 @@ def think_idle(w: Memory, rules: Rules, robot: int, step: int) -> int:
 
 
 @compiled
-def occasion(w: Memory, rules: Rules, at: int, now: float) -> int:
+def why_free(w: Memory, rules: Rules, at: int, now: float) -> int:
     """Mind._occasion: why a task can be taken."""
     latest, cause, task = -INFINITY, FREE, w.p_task[at]
     for place in range(w.t_able_count[task]):
         pair = at * w.width + place
         if place == w.p_mine[at] or w.q_met_on[pair] == 0:
             continue
-        if is_on(w, rules, pair, now):
-            return IMPATIENCE
-        if w.q_c_last[pair] > latest:
-            latest = w.q_c_last[pair]
-            cause = RELEASED if w.present[w.p_able[task * w.width + place]] else SILENCE
+        on = is_on(w, rules, pair, now)
+        heard = INFINITY if on else w.q_c_last[pair]
+        if heard > latest:
+            latest = heard
+            cause = occasion(not on, w.present[w.p_able[task * w.width + place]] == 1)
     return cause
 
 
 @compiled
-def take_up(w: Memory, rules: Rules, robot: int, at: int, step: int) -> int:
-    """Mind._start: begin to work on a task, and say so; the cause."""
+def start(w: Memory, rules: Rules, robot: int, at: int) -> int:
+    """Mind._start: begin to work on a task; the cause."""
     now, task = w.now, w.p_task[at]
-    cause = occasion(w, rules, at, now)
+    cause = why_free(w, rules, at, now)
     pair = at * w.width + w.p_mine[at]
-    w.r_active[robot] = task
-    w.r_active_since[robot] = now
-    w.r_expected[robot] = own_time(w, robot, at) if rules.learns else rules.hand_yield_time
+    w.p_expected[at] = expected_time(w, rules, robot, at)
     w.q_trying[pair] = 1
     w.q_a_started[pair] = now
     w.q_a_last[pair] = now
     w.q_a_left[pair] = INFINITY
+    w.activations += 1
+    if cause != FREE:
+        w.takeovers += 1
+    act_soon(w, rules, robot, task)
+    return cause
+
+
+@inlined
+def expected_time(w: Memory, rules: Rules, robot: int, at: int) -> float:
+    """Appraisal.expected_time."""
+    if not rules.learns:
+        return rules.hand_yield_time
+    own = own_time(w, rules, robot, at)
+    return rules.initial_task_time if math.isnan(own) else own
+
+
+@compiled
+def take_up(w: Memory, rules: Rules, robot: int, at: int, step: int) -> None:
+    """A robot works, and says so: on the task of `at`, which it has started."""
+    now, task = w.now, w.p_task[at]
+    w.r_active[robot] = task
+    w.r_active_since[robot] = now
+    w.r_expected[robot] = w.p_expected[at]
     w.r_wake[robot] = step + 1
     w.r_idle_step[robot] = NEVER
     if w.training == 0:
@@ -258,11 +289,6 @@ def take_up(w: Memory, rules: Rules, robot: int, at: int, step: int) -> int:
     beat_until(w, rules, robot, before(w, rules, robot, step))
     say(w, rules, robot, task, step)
     w.r_due[robot] = now + rules.period
-    w.activations += 1
-    if cause != FREE:
-        w.takeovers += 1
-    act_soon(w, rules, robot, task)
-    return cause
 
 
 @compiled
@@ -271,88 +297,116 @@ def rival(w: Memory, rules: Rules, robot: int, at: int, now: float) -> bool:
     task, mine = w.p_task[at], w.p_mine[at]
     for place in range(w.t_able_count[task]):
         pair = at * w.width + place
-        if place == mine or not is_on(w, rules, pair, now):
-            continue
-        if collides(w.r_active_since[robot], w.q_c_started[pair], rules.collision_window) and (
-            w.q_c_expected[pair] < w.r_expected[robot] or (w.q_c_expected[pair] == w.r_expected[robot] and place < mine)
+        if (
+            place != mine
+            and is_on(w, rules, pair, now)
+            and collides(w.r_active_since[robot], w.q_c_started[pair], rules.collision_window)
+            and gives_way(w.p_expected[at], w.q_c_expected[pair], place < mine)
         ):
             return True
     return False
 
 
 @compiled
-def not_best(w: Memory, rules: Rules, robot: int, at: int, best: float, contended: bool) -> bool:
-    """Whether the learned influence strikes the active set (erratum 1, literal); boredom is 0 while it is active."""
-    own, floor = own_time(w, robot, at), w.q_floor[at * w.width + w.p_mine[at]]
-    expects = w.r_knows[robot] and not (floor > 0.0 and own <= floor)
-    category = task_category(own, best, contended, expects, rules.ordering)
-    return influence(0.0, rules.boredom_threshold, category) == 0
+def judge(
+    w: Memory, rules: Rules, robot: int, at: int, now: float, last: float, suppressed: bool
+) -> tuple[int, bool, float]:
+    """Mind._reason_to_stop, of an active set: the cause, or -1; whether it is contended; when that may change."""
+    contended, news, lapse = contention(w, rules, at, now, last)
+    psi, lambda_, reset, gate = INFINITY, INFINITY, 1, 1
+    if not w.exploring:
+        psi, lambda_, gate = limits(w, rules, robot, at, contended, now)
+        reset = impatience_reset(news) if rules.reset_on_active else 1
+    active_for = now - w.r_active_since[robot]
+    reason = reason_to_stop(
+        w.p_complete[at] == 1,
+        1,
+        False,
+        rules.collisions and contended and rival(w, rules, robot, at, now),
+        acquiescence(active_for, psi, contended, INFINITY) == 0,
+        acquiescence(active_for, psi, contended, lambda_),
+        reset,
+        gate,
+        0 if suppressed else 1,
+    )
+    ends = sooner(INFINITY, w.r_active_since[robot] + lambda_)
+    if contended:
+        ends = min(sooner(ends, w.r_active_since[robot] + psi), w.r_settle_at[robot])
+    if contended or rules.influence_on_active:
+        ends = min(ends, lapse)
+    return (SENSED + reason if reason >= 0 else -1), contended, ends
 
 
 @compiled
-def think_active(w: Memory, rules: Rules, robot: int, step: int) -> int:  # noqa: PLR0911 - the causes, one after the other
-    """The control step of a robot that works; why it stops, or -1."""
+def limits(w: Memory, rules: Rules, robot: int, at: int, contended: bool, now: float) -> tuple[float, float, int]:
+    """Psi and lambda of an active set, and its learned influence (erratum 1, literal)."""
+    if not rules.learns:
+        return rules.hand_yield_time, rules.hand_give_up_time, 1
+    read(w, rules, robot)
+    own = own_time(w, rules, robot, at)
+    best = best_time(w, rules, at, own)
+    lambda_ = give_up_time(rules.give_up_factor, own) if rules.gives_up else INFINITY
+    gate = 1
+    if rules.influence_on_active:
+        expects = expects_best(w, robot, at, own)
+        bored = boredom(rules.boredom_rate, now - w.r_idle_since[robot]) if bored_at_work(w, rules, robot) else 0.0
+        gate = influence(bored, rules.boredom_threshold, task_category(own, best, contended, expects, rules.ordering))
+    return yield_time(rules.strategy, own, best), lambda_, gate
+
+
+@inlined
+def bored_at_work(w: Memory, rules: Rules, robot: int) -> bool:
+    """Whether boredom goes on at work (erratum 9, literal)."""
+    return rules.bored_at_work and w.r_sets[robot] == 1
+
+
+@compiled
+def think_active(w: Memory, rules: Rules, robot: int, step: int) -> int:
+    """The control step of a robot that works on one task; why it stops, or -1."""
     now, last, task = instant(w, rules, robot, step), before(w, rules, robot, step), w.r_active[robot]
     at = task * w.width + w.place[robot * TASKS + task]
     if w.p_complete[at]:
         return SENSED
     begin(w, rules, robot, now, last)
-    read(w, rules, robot)
     absence = who_is_present(w, rules, robot, now)
-    contended, news, lapse = contention(w, rules, at, now, last)
-    own = own_time(w, robot, at)
-    best = best_time(w, rules, at, own)
-    psi, lambda_ = rules.hand_yield_time, rules.hand_give_up_time
-    if rules.learns:
-        psi = yield_time(rules.strategy, own, best)
-        lambda_ = give_up_time(rules.give_up_factor, own) if rules.gives_up else INFINITY
-    active_for = now - w.r_active_since[robot]
-    if rules.collisions and contended and rival(w, rules, robot, at, now):
-        return COLLISION
-    if w.exploring:
-        w.r_contended[robot] = contended
-        w.r_wake[robot] = NEVER
-        return -1
-    if acquiescence(active_for, psi, contended, math.inf) == 0:
-        return CONTENDER
-    if acquiescence(active_for, psi, contended, lambda_) == 0:
-        return NO_SUCCESS
-    if rules.reset_on_active and impatience_reset(news) == 0:
-        return RESET
-    if rules.influence_on_active and rules.learns and not_best(w, rules, robot, at, best, contended):
-        return NOT_BEST
+    cause, contended, ends = judge(w, rules, robot, at, now, last, False)
+    if cause >= 0:
+        return cause
     w.r_contended[robot] = contended
-    ends = w.r_active_since[robot] + lambda_
-    if contended:
-        ends = min(ends, w.r_active_since[robot] + psi, w.r_settle_at[robot])
     if contended or rules.influence_on_active:
-        ends = min(ends, absence, lapse)
-    w.r_wake[robot] = max(step_from(w, rules, robot, ends - SLACK - EARLY), step + 1)
+        ends = min(ends, absence)
+    w.r_wake[robot] = NEVER if w.exploring else max(step_from(w, rules, robot, ends - SLACK - EARLY), step + 1)
     return -1
 
 
 @compiled
-def lay_down(w: Memory, rules: Rules, robot: int, cause: int, step: int) -> None:
-    """Mind._stop: cease to work on the active task, and want all tasks anew."""
-    now, task = w.now, w.r_active[robot]
-    at = task * w.width + w.place[robot * TASKS + task]
+def cease(w: Memory, rules: Rules, robot: int, at: int, cause: int) -> None:
+    """Mind._stop: an attempt of the robot itself ends."""
     pair = at * w.width + w.p_mine[at]
     if cause != SENSED and w.q_trying[pair]:
-        w.q_a_last[pair] = now
-        blameless = cause in (COLLISION, NOT_BEST)
+        w.q_a_last[pair] = w.now
+        blameless = BLAMELESS[cause]
         fail(w, rules, robot, pair, not blameless, blameless)
+
+
+@compiled
+def rest(w: Memory, rules: Rules, robot: int, step: int) -> None:
+    """A robot is idle, says so, and wants all tasks anew."""
+    now = w.now
     if w.training == 0:
         w.r_life[robot] = w.r_dies[robot] - now
     w.r_dies[robot] = INFINITY
     w.r_active[robot] = -1
     w.r_contended[robot] = 0
-    w.r_idle_since[robot] = now
+    if not bored_at_work(w, rules, robot):
+        w.r_idle_since[robot] = now
     for index in range(w.r_sets[robot]):
-        other = w.set_task[robot * TASKS + index]
-        place = other * w.width + w.place[robot * TASKS + other]
-        w.p_base[place] = 0.0
-        w.p_since[place] = now
-        w.p_growth[place] = 0.0
+        task = w.set_task[robot * TASKS + index]
+        at = task * w.width + w.place[robot * TASKS + task]
+        w.p_base[at] = 0.0
+        w.p_since[at] = now
+        w.p_growth[at] = 0.0
+        w.p_active[at] = 0
     w.r_wake[robot] = step + 1 if w.r_open[robot] > 0 else NEVER
     beat_until(w, rules, robot, before(w, rules, robot, step))
     if rules.beats:

@@ -19,6 +19,7 @@ import numpy as np
 
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
+from lalliance_agents.model.events import OCCASIONS, REASONS_TO_STOP
 from lalliance_agents.model.parameters import Architecture, Erratum, Learning, Ordering, Strategy
 from lalliance_study.compiled import Memory
 from lalliance_study.logbook import Timing
@@ -41,8 +42,9 @@ _ROBOT = {
     "first": "f8",  # its first control step
     "wake": "i8",  # the step at which it next thinks
     "idle_step": "i8",  # the step at which it first announces to be idle; NEVER if it has, or works
-    "active": "i8",  # the task it works on, or -1
+    "active": "i8",  # the task it works on, or -1; of several (erratum 5, literal) the one it speaks of
     "active_since": "f8",
+    "crowd": "i8",  # the number of its active sets where that is more than one
     "expected": "f8",
     "idle_since": "f8",
     "contended": "u1",  # whether a teammate was on its task when it last thought
@@ -57,7 +59,7 @@ _ROBOT = {
     "low": "f8",
     "high": "f8",
     "scale": "f8",
-    "fallback": "f8",
+    "longest": "f8",
     "knows": "u1",
     # its announcements
     "saying": "i8",  # task, IDLE or NOTHING
@@ -100,6 +102,8 @@ _PLACE = {
     "since": "f8",
     "growth": "f8",
     "value": "f8",
+    "expected": "f8",
+    "active": "u1",  # whether it is in a crowd
     "complete": "u1",  # as the robot knows
     "earlier": "i8",  # attempts of the trial that have ended (Monitor._earlier)
     "leavers": "i8",  # attempts that were left, and not judged yet
@@ -189,12 +193,10 @@ TEAM = np.dtype(
 LINE = np.dtype([("at", "f8"), ("robot", "i8"), ("task", "i8"), ("cause", "i8")], align=True)
 """One line of the event log: the cause as an index of `CAUSES`."""
 
-CAUSES = (
-    "free", "silence", "impatience", "released",
-    "contender", "collision", "no_success", "sensed", "not_best", "reset", "new_trial",
-)  # fmt: skip
-FREE, SILENCE, IMPATIENCE, RELEASED, CONTENDER, COLLISION, NO_SUCCESS, SENSED, NOT_BEST, RESET, NEW_TRIAL = range(11)
-VERBS = ("activate",) * 4 + ("yield", "yield", "give_up", "complete", "drop", "drop", "drop")
+CAUSES = (*OCCASIONS, *REASONS_TO_STOP)
+#: Where no teammate was heard on a task; the first of the reasons to stop, which is that the task is complete.
+FREE, SENSED = 0, len(OCCASIONS)
+BLAMELESS = np.array([cause.is_blameless for cause in CAUSES])
 
 SHARED_MAX, SHARED_ADD, RESTART = 0, 1, 2
 HAND_OVERS = ("shared_max", "shared_add", "restart")
@@ -225,6 +227,11 @@ class Rules(NamedTuple):
     hand_give_up_time: float
     influence_on_active: bool
     reset_on_active: bool
+    many: bool
+    looks_back: bool
+    closed: bool
+    bored_at_work: bool
+    replaces_unknown: bool
     self_counts: bool
     beats: bool
     slowest_of_all: bool
@@ -248,12 +255,6 @@ _RULES = np.dtype([(name, _KINDS.get(kind, "i8")) for name, kind in Rules.__anno
 def in_memory(rules: Rules) -> Memory:
     """The rules as a record, which compiled functions can hand on by its address."""
     return np.array([tuple(rules)], _RULES).view(np.recarray)
-
-
-#: Readings that the kernel cannot make literal: they make every step count, or leave times undefined.
-NOT_LITERAL = {
-    Erratum.ONE_ACTIVE, Erratum.WINDOW_ENDS, Erratum.BOREDOM_AT_WORK, Erratum.UNKNOWN_TIMES, Erratum.LEARNING_WINDOW,
-}  # fmt: skip
 
 
 def rules_of(mission: Mission, timing: Timing | None = None) -> Rules:
@@ -292,6 +293,11 @@ def rules_of(mission: Mission, timing: Timing | None = None) -> Rules:
         by_hand.give_up_time,
         literal(Erratum.INFLUENCE_ON_ACTIVE),
         literal(Erratum.RESET_ON_ACTIVE),
+        literal(Erratum.ONE_ACTIVE),
+        literal(Erratum.LEARNING_WINDOW),
+        not literal(Erratum.WINDOW_ENDS),
+        literal(Erratum.BOREDOM_AT_WORK),
+        not literal(Erratum.UNKNOWN_TIMES),
         not literal(Erratum.SELF_PRESENCE),
         not literal(Erratum.IDLE_HEARTBEAT),
         literal(Erratum.SLOWEST_OF_WHOM),
@@ -311,12 +317,10 @@ def rules_of(mission: Mission, timing: Timing | None = None) -> Rules:
 
 def _refusals(mission: Mission, timing: Timing) -> list[tuple[str, bool]]:
     parameters, options = mission.parameters, mission.environment.options
-    literal = [erratum.value for erratum in NOT_LITERAL if parameters.is_literal(erratum)]
     width = max(len(mission.able(task)) for task in mission.tasks)
     return [
         ("its environment is no task pool without noise",
          mission.environment.kind != "task_pool" or options.get("noise", 0.0) != 0.0),
-        (f"it reads {', '.join(literal)} literally", bool(literal)),
         ("robots differ in their parameters", any(robot.parameters for robot in mission.robots.values())),
         ("parameters set by hand differ between tasks", bool(parameters.by_hand_tasks)),
         ("tasks arrive, or wait for others", any(task.after or task.arrives for task in mission.tasks.values())),

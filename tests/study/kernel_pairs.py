@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from lalliance_agents.model.parameters import Erratum, Parameters
 from lalliance_study.kernel import run_logged
-from lalliance_study.kernel_state import CAUSES, NOT_LITERAL, VERBS, rules_of
+from lalliance_study.kernel_state import CAUSES, rules_of
 from lalliance_study.scenarios import Missions, Scenario, draw_missions, mission_of
 from lalliance_study.simulator import Simulator
 
@@ -17,7 +17,7 @@ SAME = 1e-9
 #: Missions that do not complete are given up after this many seconds, as the simulator needs time for them.
 LONGEST = 600.0
 
-LITERAL = sorted(set(Erratum) - NOT_LITERAL - {Erratum.STRATEGY_ONE, Erratum.SECOND_PATIENCE})
+LITERAL = sorted(set(Erratum) - {Erratum.STRATEGY_ONE, Erratum.SECOND_PATIENCE})
 
 
 class Event(NamedTuple):
@@ -88,7 +88,7 @@ def compiled(scenario: Scenario, parameters: Parameters, missions: Missions, num
         Event(
             float(line["at"]),
             f"r{int(line['robot']):02}",
-            VERBS[int(line["cause"])],
+            CAUSES[int(line["cause"])].verb,
             f"t{int(line['task']):02}",
             CAUSES[int(line["cause"])],
         )
