@@ -1,9 +1,19 @@
-"""Random missions of the study, each run by the exact simulator and by the kernel, and where the two differ first."""
+"""Random missions of the study, each run by the exact simulator and by the kernel, and where the two differ first.
 
+    PYTHONPATH=tests python -m study.kernel_pairs --missions 5000
+
+runs as many as one likes, over everything that the kernel accepts, and counts what was among them.
+"""
+
+import argparse
 import math
 import random
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
+
+from rich.console import Console
+from rich.progress import track
 
 from lalliance_agents.model.parameters import Erratum, Parameters
 from lalliance_study.kernel import run_logged
@@ -15,7 +25,7 @@ from lalliance_study.simulator import Simulator
 SAME = 1e-9
 
 #: Missions that do not complete are given up after this many seconds, as the simulator needs time for them.
-LONGEST = 600.0
+LONGEST = 150.0
 
 LITERAL = sorted(set(Erratum) - {Erratum.STRATEGY_ONE, Erratum.SECOND_PATIENCE})
 
@@ -30,13 +40,59 @@ class Event(NamedTuple):
     why: str
 
 
+def draw_parameters(chance: random.Random) -> dict[str, Any]:
+    """Parameters: the numbers are those of the defaults, or others that a study of their effects would try."""
+    rate = chance.choice([5.0, 5.0, 2.0, 3.0, 10.0])
+    shortest, longest = chance.choice([(0.2, 1.0), (0.2, 1.0), (0.1, 0.5), (1.0, 6.0), (0.7, 0.7)])
+    found: dict[str, Any] = {
+        "strategy": chance.choice(["I", "II", "III"]),
+        "ordering": chance.choice(["derived", "modified_shortest_first", "modified_random", "longest_first"]),
+        "architecture": chance.choice([*["l-alliance"] * 5, "alliance"]),
+        "trials": chance.choice([10, 10, 3, 1]),
+        "broadcast_rate": rate,
+        "silence_timeout": chance.choice([tau for tau in (1.0, 1.0, 0.7, 2.5) if tau > 2 / rate] or [1.5]),
+        "min_delay": shortest,
+        "max_delay": longest,
+        "threshold": chance.choice([1.0, 1.0, 0.3, 4.0]),
+        "boredom_threshold": chance.choice([1.0, 2.0]),
+        "give_up_factor": chance.choice([2.0, 2.0, 0.7, 5.0]),
+        "failure_factor": chance.choice([2.0, 2.0, 1.2]),
+        "initial_task_time": chance.choice([30.0, 4.0]),
+        "readings": draw_readings(chance),
+    }
+    if chance.random() < 0.2:
+        found["boredom_rate"] = found["boredom_threshold"] / chance.uniform(1.05 * longest, 40.0)
+    if chance.random() < 0.2:
+        found["collision_window"] = chance.choice([0.0, 0.05, 1.5])
+    if found["architecture"] == "alliance":
+        found["by_hand"] = {
+            "patience": chance.uniform(1, 40),
+            "slow_rate": chance.uniform(0.01, 0.5),
+            "fast_rate": chance.uniform(0.3, 3),
+            "yield_time": chance.uniform(1, 40),
+            "give_up_time": chance.uniform(5, 80),
+        }
+    if found["strategy"] != "I" and chance.random() < 0.2:
+        found["readings"][Erratum.STRATEGY_ONE] = "literal"
+    return found
+
+
+def draw_readings(chance: random.Random) -> dict[Erratum, str]:
+    """Often none; now and then all at once, as the Appendix has it."""
+    count = chance.choice([0, 0, 0, 1, 1, 2, 3, len(LITERAL)])
+    readings = dict.fromkeys(chance.sample(LITERAL, count), "literal")
+    if chance.random() < 0.2:
+        readings[Erratum.SECOND_PATIENCE] = "mended"
+    return readings
+
+
 def draw_point(seed: int, **fixed: Any) -> tuple[Scenario, Parameters]:
     """A scenario and parameters; `fixed` are fields of either that are not drawn."""
     chance = random.Random(seed)
-    robots = chance.randint(2, 8)
+    robots = chance.randint(2, 6)
     scenario: dict[str, Any] = {
         "robots": robots,
-        "tasks": chance.randint(1, 14),
+        "tasks": chance.randint(1, 8),
         "coverage": chance.randint(1, min(4, robots)),
         "heterogeneity": chance.choice([0.0, 100.0, 400.0, 3200.0]),
         "spread": chance.choice(["unrelated", "related", "log_uniform"]),
@@ -44,20 +100,10 @@ def draw_point(seed: int, **fixed: Any) -> tuple[Scenario, Parameters]:
         "failures": chance.choice([0, 0, 0.3, 0.8]),
         "traps": chance.choice([0, 0, 0.2, 0.6]),
         "noise": chance.choice([0, 0.1, 0.3]),
-        "samples": chance.choice([10, 10, 3, 0]),
-        "training": chance.choice([0, 0, 0, 1, 3]),
+        "samples": chance.choice([10, 10, 10, 3, 0]),
+        "training": chance.choice([0, 0, 0, 0, 1, 2]),
     }
-    readings = dict.fromkeys(chance.sample(LITERAL, chance.choice([0, 0, 0, 1, 2])), "literal")
-    if chance.random() < 0.2:
-        readings[Erratum.SECOND_PATIENCE] = "mended"
-    parameters: dict[str, Any] = {
-        "strategy": chance.choice(["I", "II", "III"]),
-        "ordering": chance.choice(["derived", "modified_shortest_first", "modified_random", "longest_first"]),
-        "architecture": chance.choice([*["l-alliance"] * 4, "alliance"]),
-        "trials": chance.choice([10, 10, 3]),
-        "broadcast_rate": chance.choice([5.0, 5.0, 3.0, 10.0]),
-        "readings": readings,
-    }
+    parameters = draw_parameters(chance)
     for field, value in fixed.items():
         (scenario if field in Scenario.model_fields else parameters)[field] = value
     made = Scenario.model_validate(scenario)
@@ -130,3 +176,44 @@ def difference(seed: int, *, missions: int = 2, **fixed: Any) -> str | None:
         if found is not None:
             return f"seed {seed}, mission {number}, {scenario!r}, {parameters.model_dump(exclude_unset=True)}: {found}"
     return None
+
+
+def groups(scenario: Scenario, parameters: Parameters) -> Iterator[str]:
+    """What is tested by a mission."""
+    yield f"strategy {parameters.strategy.name}"
+    yield f"ordering {parameters.ordering.name.lower()}"
+    yield f"architecture {parameters.architecture.value}"
+    yield f"hand-over {scenario.hand_over}"
+    yield "robots die" if scenario.failures else "no robot dies"
+    yield "PWW false" if scenario.traps else "PWW true"
+    yield "after active learning" if scenario.training else "live from the start"
+    yield "knowledge none" if scenario.samples == 0 else f"knowledge given, noise {scenario.noise:g}"
+    literal = [one for one in Erratum if parameters.is_literal(one) and one is not Erratum.SECOND_PATIENCE]
+    yield "errata all mended" if not literal else f"errata {len(literal) if len(literal) < 5 else 'all'} literal"
+    yield from (f"literal {one.value}" for one in literal)
+    if not parameters.is_literal(Erratum.SECOND_PATIENCE):
+        yield f"mended {Erratum.SECOND_PATIENCE.value}"
+
+
+def main() -> int:
+    """Compare missions; 1 if any differ."""
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("--missions", type=int, default=5000, help="at least so many, two of each point")
+    arguments.add_argument("--seed", type=int, default=0, help="the first of the seeds, one for each point")
+    chosen = arguments.parse_args()
+    counts: Counter[str] = Counter()
+    differences, console = [], Console(highlight=False)
+    for seed in track(range(chosen.seed, chosen.seed + (chosen.missions + 1) // 2), "Comparing", console=console):
+        counts.update(dict.fromkeys(["missions", *groups(*draw_point(seed))], 2))
+        found = difference(seed)
+        if found is not None:
+            differences.append(found)
+            console.print(found, markup=False)
+    for group, count in sorted(counts.items()):
+        console.print(f"{count:6} {group}")
+    console.print(f"{len(differences)} points differ")
+    return 1 if differences else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
