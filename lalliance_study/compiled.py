@@ -19,6 +19,12 @@ from lalliance_agents.model import equations
 P = ParamSpec("P")
 R = TypeVar("R")
 
+# The kernel's loops are short: to do several passes at once costs time, and much more to compile.
+numba.config.LOOP_VECTORIZE = numba.config.SLP_VECTORIZE = 0  # type: ignore[attr-defined]
+
+_njit: Callable[..., Any] = numba.njit
+_unliteral: Callable[[types.Type], types.Type] = types.unliteral
+
 #: A record or an array of the kernel: numba finds out what is in it, mypy does not.
 Memory = Any
 
@@ -39,12 +45,12 @@ def entrance(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _made(function: Callable[P, R], **options: bool) -> Callable[P, R]:
-    made = numba.njit(error_model="numpy", **options)(function)
+    made = _njit(error_model="numpy", **options)(function)
     typed = made.get_call_template
 
     def of_kind(arguments: Sequence[types.Type], named: dict[str, types.Type]) -> Any:
         # Without this a function is compiled anew for each number that is written out in a call.
-        return typed([types.unliteral(one) for one in arguments], named)
+        return typed([_unliteral(one) for one in arguments], named)
 
     made.get_call_template = of_kind
     compiles: Callable[P, R] = made

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from lalliance_study.compiled import Memory, compiled, entrance
+from lalliance_study.compiled import Memory, compiled, entrance, inlined
 from lalliance_study.kernel_hearing import (
     arrive,
     beat_until,
@@ -54,6 +54,7 @@ def _sense(w: Memory, rules: Rules, task: int) -> None:
         w.p_complete[at] = 1
         w.p_base[at] = 0.0
         w.p_growth[at] = 0.0
+        w.r_stirred[robot] = 1
         w.r_open[robot] -= 1
         if w.r_active[robot] < 0 and w.r_open[robot] == 0:
             w.r_wake[robot] = NEVER
@@ -102,28 +103,57 @@ def _happen(w: Memory, rules: Rules) -> None:
         leave(w, rules, who, w.now)
 
 
+@inlined
+def _next_step(w: Memory, rules: Rules) -> tuple[int, float, int]:
+    """The robot that makes the next control step, when, and which."""
+    robot, step_at, step = -1, INFINITY, NEVER
+    for one in range(w.n):
+        due = min(w.r_wake[one], w.r_idle_step[one])
+        if due < NEVER:
+            at = instant(w, rules, one, due)
+            if at < step_at:
+                robot, step_at, step = one, at, due
+    return robot, step_at, step
+
+
+@inlined
+def _next_mishap(w: Memory) -> tuple[int, float]:
+    """The robot that next dies, gets stuck or comes free, and when."""
+    robot, mishap_at = -1, INFINITY
+    for one in range(w.n):
+        if w.r_turn[one] < mishap_at or w.r_dies[one] < mishap_at:
+            robot, mishap_at = one, min(w.r_turn[one], w.r_dies[one])
+    return robot, mishap_at
+
+
+@compiled
+def _write(w: Memory, log: np.ndarray, robot: int) -> None:
+    for index in range(w.noted):
+        line = log[w.lines + index]
+        line["at"] = w.now
+        line["robot"] = robot
+        line["task"] = w.note_task[index]
+        line["cause"] = w.note_cause[index]
+
+
 @compiled
 def run_one(w: Memory, rules: Rules, missions: Missions, number: int, log: np.ndarray) -> None:
     """Run a mission to its end."""
     load(w, rules, missions, number)
     while w.over == 0:
-        robot, step_at, step = -1, INFINITY, NEVER
-        special, special_at = -1, INFINITY
-        for one in range(w.n):
-            due = min(w.r_wake[one], w.r_idle_step[one])
-            if due < NEVER:
-                at = instant(w, rules, one, due)
-                if at < step_at:
-                    robot, step_at, step = one, at, due
-            if w.r_turn[one] < special_at or w.r_dies[one] < special_at:
-                special, special_at = one, min(w.r_turn[one], w.r_dies[one])
+        robot, step_at, step = _next_step(w, rules)
+        special, special_at = _next_mishap(w)
         soon_at = w.soon_at[w.soon_head % QUEUE] if w.soon_head < w.soon_tail else INFINITY
         act_at = w.acts_at[w.acts_head % QUEUE] if w.acts_head < w.acts_tail else INFINITY
         world_at = min(w.look, w.gives_up_at, w.trial_at)
         earliest = min(soon_at, act_at, world_at, special_at)
         if step_at < earliest:
             w.now = step_at
-            make_step(w, rules, log, robot, step)
+            make_step(w, rules, robot, step)
+            if w.noted > 0:
+                if w.lines + w.noted <= log.shape[0]:
+                    _write(w, log, robot)
+                w.lines += w.noted
             continue
         w.now = earliest
         if act_at == earliest:
@@ -190,14 +220,16 @@ def run_in_threads(rules: Rules, missions: Missions, threads: int) -> np.ndarray
     return results
 
 
-def run_logged(
-    rules: Rules, missions: Missions, number: int, lines: int = 20_000
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def run_logged(rules: Rules, missions: Missions, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run one mission: its result, its event log, and when each task was completed, in seconds after its beginning."""
-    teams, log = new_teams(1), np.zeros(lines, LINE)
+    teams, log = new_teams(1), _NO_LOG
     only = Missions._make(part[number : number + 1] for part in missions)
     results = np.zeros((1, len(RESULTS)))
-    _run_some(teams, in_memory(rules), only, results, log, 0, 1)
     w = teams[0]
+    while True:
+        _run_some(teams, in_memory(rules), only, results, log, 0, 1)
+        if w.lines == len(log):
+            break
+        log = np.zeros(int(w.lines), LINE)
     ends = np.array([w.t_ends[task] if w.t_closed[task] else np.nan for task in range(int(w.m))])
-    return results[0], log[: int(w.lines)], ends - float(w.began)
+    return results[0], log, ends - float(w.began)

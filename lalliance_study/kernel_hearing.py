@@ -9,19 +9,19 @@ See `hearing`, `listening` and `monitor` in the model for what is kept and why.
 
 import math
 
-from lalliance_agents.model.equations import (
-    censored,
-    credited,
-    goes_on,
-    leaves_no_trace,
-    may_have_done,
-    more_than,
-    task_time,
-)
+from lalliance_agents.model import equations
 from lalliance_agents.model.parameters import SLACK
 from lalliance_study.compiled import Memory, compiled, inlined
 from lalliance_study.kernel_state import HEAR, IDLE, INFINITY, NEVER, NOTHING, ROBOTS, SAMPLES, TASKS, Rules
 from lalliance_study.kernel_world import soon
+
+censored = equations.censored
+credited = equations.credited
+goes_on = equations.goes_on
+leaves_no_trace = equations.leaves_no_trace
+may_have_done = equations.may_have_done
+more_than = equations.more_than
+task_time = equations.task_time
 
 
 @inlined
@@ -42,7 +42,7 @@ def step_from(w: Memory, rules: Rules, robot: int, at: float) -> int:
     """The first step of a robot that is not before `at`."""
     if at == INFINITY:
         return NEVER
-    step: int = max(math.ceil((at - w.r_first[robot]) / rules.step - SLACK), 0)
+    step: int = max(math.ceil((at - w.r_first[robot]) * rules.steps_per_second - SLACK), 0)
     while instant(w, rules, robot, step) < at:
         step += 1
     return step
@@ -67,7 +67,7 @@ def next_beat(w: Memory, rules: Rules, robot: int) -> int:
 @compiled
 def beat_until(w: Memory, rules: Rules, robot: int, until: float) -> None:
     """Let a robot make all announcements up to and including the instant `until`."""
-    many = math.floor((until - w.r_due[robot]) / rules.period) - 1.0
+    many = math.floor((until - w.r_due[robot]) * rules.rate) - 1.0
     if many > 0.0:
         w.r_due[robot] += many * rules.period
         w.sent += int(many)
@@ -140,6 +140,7 @@ def refresh(w: Memory, hearer: int, pair: int) -> None:
         samples = w.samples[pair * SAMPLES : pair * SAMPLES + count]
         w.q_time[pair] = task_time(samples, w.q_floor[pair])
         w.q_measured[pair] = task_time(samples, 0.0) if w.q_floor[pair] > 0.0 else w.q_time[pair]
+    w.p_stale[w.q_at[pair]] = 1
     w.r_stale[hearer] = 1
 
 
@@ -341,6 +342,7 @@ def hush(w: Memory, rules: Rules, speaker: int) -> None:
 @compiled
 def _tell(w: Memory, rules: Rules, hearer: int, task: int, news: bool, old_task: int, old_last: float) -> None:
     """Have a hearer think as soon as what it heard, or will not hear any more, can matter to it."""
+    w.r_stirred[hearer] = 1
     if w.r_dead[hearer] or (w.r_open[hearer] == 0 and w.r_active[hearer] < 0):
         return
     if w.r_waiting[hearer]:

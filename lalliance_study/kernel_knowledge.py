@@ -40,26 +40,39 @@ def read(w: Memory, rules: Rules, robot: int) -> None:
     if w.r_stale[robot] == 0:
         return
     w.r_stale[robot] = 0
-    longest, low, high, knows = 0.0, INFINITY, -INFINITY, False
+    longest, low, high, knows, unknown = 0.0, INFINITY, -INFINITY, False, False
     for index in range(w.r_sets[robot]):
         task = w.set_task[robot * TASKS + index]
-        mine = w.place[robot * TASKS + task]
-        first = (task * w.width + mine) * w.width
-        for place in range(w.t_able_count[task]):
-            time = w.q_time[first + place]
-            if not math.isnan(time):
-                low, high = min(low, time), max(high, time)
-                longest = max(longest, w.q_measured[first + place])
-                knows = knows or place != mine
+        at = task * w.width + w.place[robot * TASKS + task]
+        if w.p_stale[at]:
+            _extent(w, at)
+        low, high = min(low, w.p_low[at]), max(high, w.p_high[at])
+        longest = max(longest, w.p_longest[at])
+        knows = knows or w.p_of_mates[at] == 1
+        unknown = unknown or math.isnan(w.q_time[at * w.width + w.p_mine[at]])
     w.r_longest[robot] = longest
-    for index in range(w.r_sets[robot]):
-        task = w.set_task[robot * TASKS + index]
-        own = own_time(w, rules, robot, task * w.width + w.place[robot * TASKS + task])
-        if not math.isnan(own):
+    if unknown and rules.replaces_unknown:
+        for index in range(w.r_sets[robot]):
+            task = w.set_task[robot * TASKS + index]
+            own = own_time(w, rules, robot, task * w.width + w.place[robot * TASKS + task])
             low, high = min(low, own), max(high, own)
     w.r_low[robot], w.r_high[robot] = low, high
     w.r_scale[robot] = scale_factor(rules.min_delay, rules.max_delay, low, high)
     w.r_knows[robot] = knows or not rules.replaces_unknown
+
+
+@compiled
+def _extent(w: Memory, at: int) -> None:
+    """Monitor.extent: the range of the times known of one task."""
+    longest, low, high, of_mates = 0.0, INFINITY, -INFINITY, False
+    for place in range(w.t_able_count[w.p_task[at]]):
+        time = w.q_time[at * w.width + place]
+        if not math.isnan(time):
+            low, high = min(low, time), max(high, time)
+            longest = max(longest, w.q_measured[at * w.width + place])
+            of_mates = of_mates or place != w.p_mine[at]
+    w.p_stale[at] = 0
+    w.p_low[at], w.p_high[at], w.p_longest[at], w.p_of_mates[at] = low, high, longest, of_mates
 
 
 @compiled

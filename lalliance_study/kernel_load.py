@@ -6,7 +6,7 @@ few steps before that, in which they only announced that they are there.
 
 import math
 
-from lalliance_study.compiled import Memory, compiled
+from lalliance_study.compiled import Memory, compiled, inlined
 from lalliance_study.kernel_explore import draw
 from lalliance_study.kernel_hearing import beat_until, next_beat, refresh, wake_by
 from lalliance_study.kernel_state import INFINITY, NEVER, NOTHING, ROBOTS, SAMPLES, TASKS, Rules
@@ -15,71 +15,87 @@ from lalliance_study.scenarios import Missions
 
 
 @compiled
-def _load_robot(w: Memory, rules: Rules, missions: Missions, number: int, robot: int) -> None:
-    w.r_first[robot] = missions.phase[number, robot] * rules.step
-    w.r_life[robot] = missions.life[number, robot]
-    w.r_chance[robot] = missions.chance[number, robot]
-    w.r_drawn[robot] = 0
-    w.r_mates[robot] = 0
-    w.r_sets[robot] = 0
-    w.r_stale[robot] = 1
-    w.r_longest[robot] = 0.0
-    w.r_dies[robot] = INFINITY
-    for other in range(w.n):
-        w.k_met[robot * ROBOTS + other] = 0
+def _load_robots(w: Memory, rules: Rules, missions: Missions, number: int) -> None:
+    for robot in range(w.n):
+        w.r_first[robot] = missions.phase[number, robot] * rules.step
+        w.r_life[robot] = missions.life[number, robot]
+        w.r_chance[robot] = missions.chance[number, robot]
+        w.r_drawn[robot] = 0
+        w.r_mates[robot] = 0
+        w.r_sets[robot] = 0
+        w.r_stale[robot] = 1
+        w.r_longest[robot] = 0.0
+        w.r_dies[robot] = INFINITY
+        for other in range(w.n):
+            w.k_met[robot * ROBOTS + other] = 0
+        for task in range(w.m):
+            w.place[robot * TASKS + task] = -1
+        # Its first step of all announces, and then it does so every period.
+        w.r_beat[robot] = -1
+        w.r_due[robot] = 0.0
+        if w.r_first[robot] <= w.born:
+            w.r_beat[robot] = 0
+            w.r_due[robot] = rules.period
+
+
+@compiled
+def _load_tasks(w: Memory, missions: Missions, number: int) -> None:
     for task in range(w.m):
-        w.place[robot * TASKS + task] = -1
-    # Its first step of all announces, and then it does so every period.
-    w.r_beat[robot] = -1
-    w.r_due[robot] = 0.0
-    if w.r_first[robot] <= w.born:
-        w.r_beat[robot] = 0
-        w.r_due[robot] = rules.period
+        count = 0
+        for place in range(w.width):
+            robot = missions.able[number, task, place]
+            if robot < 0:
+                break
+            count += 1
+            at = task * w.width + place
+            w.p_able[at] = robot
+            w.p_stale[at] = 1
+            w.p_task[at] = task
+            w.p_mine[at] = place
+            w.p_own[at] = missions.own[number, task, place]
+            w.p_draw[at] = missions.draw[number, task, place]
+            w.p_trap_at[at] = missions.trap_at[number, task, place]
+            w.p_trap_lasts[at] = missions.trap_lasts[number, task, place]
+            w.place[robot * TASKS + task] = place
+            w.set_task[robot * TASKS + w.r_sets[robot]] = task
+            w.r_sets[robot] += 1
+        w.t_able_count[task] = count
+
+
+@inlined
+def _alike(w: Memory, one: int, other: int, samples: int) -> bool:
+    same = True
+    for index in range(samples):
+        same = same and w.samples[one * SAMPLES + index] == w.samples[other * SAMPLES + index]
+    return same
 
 
 @compiled
-def _load_task(w: Memory, missions: Missions, number: int, task: int) -> None:
-    count = 0
-    for place in range(w.width):
-        robot = missions.able[number, task, place]
-        if robot < 0:
-            break
-        count += 1
-        at = task * w.width + place
-        w.p_able[at] = robot
-        w.p_task[at] = task
-        w.p_mine[at] = place
-        w.p_own[at] = missions.own[number, task, place]
-        w.p_draw[at] = missions.draw[number, task, place]
-        w.p_trap_at[at] = missions.trap_at[number, task, place]
-        w.p_trap_lasts[at] = missions.trap_lasts[number, task, place]
-        w.place[robot * TASKS + task] = place
-        w.set_task[robot * TASKS + w.r_sets[robot]] = task
-        w.r_sets[robot] += 1
-    w.t_able_count[task] = count
-
-
-@compiled
-def _load_knowledge(w: Memory, rules: Rules, missions: Missions, number: int, task: int) -> None:
+def _load_knowledge(w: Memory, rules: Rules, missions: Missions, number: int) -> None:
     """Samples of the width x width pairs of a task: the last mu."""
-    samples = min(missions.known.shape[4], rules.trials)
-    first = missions.known.shape[4] - samples
-    count = w.t_able_count[task]
-    for mine in range(count):
-        hearer = w.p_able[task * w.width + mine]
+    for task in range(w.m):
+        samples = min(missions.known.shape[4], rules.trials)
+        first = missions.known.shape[4] - samples
+        count = w.t_able_count[task]
         for place in range(count):
-            pair = (task * w.width + mine) * w.width + place
-            w.q_at[pair] = task * w.width + mine
-            w.q_speaker[pair] = w.p_able[task * w.width + place]
-            w.q_time[pair] = math.nan
-            w.q_measured[pair] = 0.0
-            w.q_floor[pair] = 0.0
-            w.q_floor_left[pair] = 0
-            given = missions.known[number, task, mine, place]
-            for index in range(samples):
-                w.samples[pair * SAMPLES + index] = given[first + index]
-            w.q_count[pair] = samples
-            refresh(w, hearer, pair)
+            like = -1  # who was given the same samples
+            for mine in range(count):
+                hearer = w.p_able[task * w.width + mine]
+                pair = (task * w.width + mine) * w.width + place
+                w.q_at[pair] = task * w.width + mine
+                w.q_speaker[pair] = w.p_able[task * w.width + place]
+                w.q_time[pair] = math.nan
+                w.q_measured[pair] = 0.0
+                w.q_floor[pair] = 0.0
+                w.q_floor_left[pair] = 0
+                for index in range(samples):
+                    w.samples[pair * SAMPLES + index] = missions.known[number, task, mine, place, first + index]
+                w.q_count[pair] = samples
+                if like >= 0 and _alike(w, like, pair, samples):
+                    w.q_time[pair], w.q_measured[pair] = w.q_time[like], w.q_measured[like]
+                else:
+                    like = pair
+                    refresh(w, hearer, pair)
 
 
 @compiled
@@ -106,6 +122,7 @@ def _begin_robot(w: Memory, rules: Rules, robot: int) -> None:
     w.r_crowd[robot] = 0
     w.r_idle_since[robot] = w.born
     w.r_contended[robot] = 0
+    w.r_stirred[robot] = 1
     w.r_waiting[robot] = rules.beats
     w.r_dead[robot] = w.r_sets[robot] == 0
     w.r_met[robot] = 0
@@ -199,10 +216,9 @@ def load(w: Memory, rules: Rules, missions: Missions, number: int) -> None:
     w.last_end = 0.0
     w.soon_head = w.soon_tail = w.acts_head = w.acts_tail = 0
     w.sent = w.activations = w.takeovers = w.lines = 0
-    for robot in range(w.n):
-        _load_robot(w, rules, missions, number, robot)
-    for task in range(w.m):
-        _load_task(w, missions, number, task)
-        _load_knowledge(w, rules, missions, number, task)
+    # Each array of `missions` is counted whenever it is handed on, by all threads: that is done once for each part.
+    _load_robots(w, rules, missions, number)
+    _load_tasks(w, missions, number)
+    _load_knowledge(w, rules, missions, number)
     _find_mates(w)
     begin_trial(w, rules)

@@ -30,6 +30,9 @@ ROBOTS, TASKS, PAIRS, SAMPLES = 20, 40, 4000, 10
 PLACES = 800
 #: Length of the queues of what is on its way: more than can be (3 a robot, and the tasks).
 QUEUE = 256
+#: What a robot can decide in one step: to start or stop all its sets. An array handed on is counted, a record is not, so
+#: that decisions get to the log from here.
+NOTES = TASKS
 
 NEVER = 2**62
 INFINITY = math.inf
@@ -49,6 +52,8 @@ _ROBOT = {
     "idle_since": "f8",
     "contended": "u1",  # whether a teammate was on its task when it last thought
     "waiting": "u1",
+    "stirred": "u1",  # whether anything was heard or sensed since it last thought while idle
+    "steady": "f8",  # until when nobody it has heard is absent, and no attempt is judged
     "dead": "u1",
     "met": "i8",  # teammates heard in this trial
     "mates": "i8",  # teammates there are
@@ -102,9 +107,15 @@ _PLACE = {
     "since": "f8",
     "growth": "f8",
     "value": "f8",
+    "changes": "f8",  # when it changes by itself, but for its ramp, while its robot is idle
     "expected": "f8",
     "active": "u1",  # whether it is in a crowd
     "complete": "u1",  # as the robot knows
+    "stale": "u1",  # whether the four below are out of date: see Extent
+    "low": "f8",
+    "high": "f8",
+    "longest": "f8",
+    "of_mates": "u1",
     "earlier": "i8",  # attempts of the trial that have ended (Monitor._earlier)
     "leavers": "i8",  # attempts that were left, and not judged yet
 }
@@ -159,7 +170,7 @@ _SCALARS = {
     "activations": "i8",
     "takeovers": "i8",
     "lines": "i8",
-    "most_lines": "i8",
+    "noted": "i8",
 }
 
 
@@ -183,6 +194,8 @@ TEAM = np.dtype(
         ("soon_at", "f8", (QUEUE,)),
         ("soon_kind", "i8", (QUEUE,)),
         ("soon_who", "i8", (QUEUE,)),
+        ("note_task", "i8", (NOTES,)),
+        ("note_cause", "i8", (NOTES,)),
         ("acts_at", "f8", (QUEUE,)),
         ("acts_who", "i8", (QUEUE,)),
         ("acts_task", "i8", (QUEUE,)),
@@ -208,6 +221,7 @@ class Rules(NamedTuple):
     strategy: Strategy
     ordering: Ordering
     threshold: float
+    rate: float
     period: float
     tau: float
     trials: int
@@ -241,6 +255,7 @@ class Rules(NamedTuple):
     collisions: bool
     per_attempt: bool
     step: float
+    steps_per_second: float
     world_step: float
     delay: float
     deadline: float
@@ -274,6 +289,7 @@ def rules_of(mission: Mission, timing: Timing | None = None) -> Rules:
         parameters.strategy,
         parameters.ordering,
         parameters.threshold,
+        parameters.broadcast_rate,
         parameters.broadcast_period,
         parameters.silence_timeout,
         parameters.trials,
@@ -307,6 +323,7 @@ def rules_of(mission: Mission, timing: Timing | None = None) -> Rules:
         not literal(Erratum.COLLISION),
         not literal(Erratum.SECOND_PATIENCE),
         mission.control_period,
+        1 / mission.control_period,
         timing.world_step,
         timing.message_delay,
         mission.deadline,

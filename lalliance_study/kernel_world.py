@@ -102,7 +102,8 @@ def renew_crew(w: Memory, rules: Rules, task: int, now: float) -> None:
 
 @compiled
 def close(w: Memory, rules: Rules, now: float) -> None:
-    """Tasks end that were due until `now`."""
+    """Tasks end that were due until `now`, but for those due after the deadline."""
+    now = min(now, w.began + rules.deadline)
     if now >= w.next_end:
         for task in range(w.m):
             if w.t_closed[task] == 0 and w.t_ends[task] <= now:
