@@ -193,8 +193,8 @@ def _run_some(
 RESULTS = ("makespan", "activations", "takeovers", "sent", "decisions")
 """What is kept of a mission: seconds (NaN where the deadline came first), and counts."""
 
-#: Missions that a thread takes at a time.
-AT_ONCE = 100
+#: Parts that each thread has of the missions, so that none waits long for the last.
+PARTS = 16
 
 _NO_LOG = np.zeros(0, LINE)
 
@@ -209,11 +209,12 @@ def run_missions(rules: Rules, missions: Missions) -> np.ndarray:
 def run_in_threads(rules: Rules, missions: Missions, threads: int) -> np.ndarray:
     """The same in several threads, with the same result."""
     results = np.zeros((len(missions.able), len(RESULTS)))
-    laws, firsts = in_memory(rules), iter(range(0, len(results), AT_ONCE))
+    at_once = math.ceil(len(results) / (PARTS * threads))
+    laws, firsts = in_memory(rules), iter(range(0, len(results), max(at_once, 1)))
 
     def work(team: Memory) -> None:
         for first in firsts:  # whichever thread is free takes the next
-            _run_some(team, laws, missions, results, _NO_LOG, first, min(first + AT_ONCE, len(results)))
+            _run_some(team, laws, missions, results, _NO_LOG, first, min(first + at_once, len(results)))
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(work, [new_teams(1) for _ in range(threads)]))
