@@ -15,6 +15,7 @@ from lalliance_study.compiled import Memory, compiled, inlined
 from lalliance_study.kernel_state import HEAR, IDLE, INFINITY, NEVER, NOTHING, ROBOTS, SAMPLES, TASKS, Rules
 from lalliance_study.kernel_world import soon
 
+announces_from = equations.announces_from
 censored = equations.censored
 credited = equations.credited
 goes_on = equations.goes_on
@@ -59,8 +60,8 @@ def wake_by(w: Memory, rules: Rules, robot: int, at: float) -> None:
 @compiled
 def next_beat(w: Memory, rules: Rules, robot: int) -> int:
     """The step of the next announcement: the first nearest to the instant at which it is due."""
-    due = w.r_due[robot] - rules.step / 2 - SLACK
-    step: int = max(step_from(w, rules, robot, due), w.r_beat[robot] + 1)
+    earliest = announces_from(w.r_due[robot], rules.step)
+    step: int = max(step_from(w, rules, robot, earliest), w.r_beat[robot] + 1)
     return step
 
 

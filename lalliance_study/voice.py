@@ -94,7 +94,7 @@ class Voice:
 
     def made(self, step: int) -> None:
         """A control step was made, and what it announced was said."""
-        if self._mind.broadcast_due != self._due or self._beat_step <= step:
+        if self._mind.cadence.due != self._due or self._beat_step <= step:
             self._plan(step + 1)
         self._settle()
 
@@ -157,7 +157,7 @@ class Voice:
         mind, grid, before, at = self._mind, self._grid, self._seq, 0.0
         while self.unmade <= now:
             at = grid.instant(self._beat_step)
-            mind.keep_beat(at)
+            mind.cadence.keep(at)
             self._seq += 1
             self._plan(self._beat_step + 1)
             self.unmade = grid.instant(self._beat_step) + self._delay
@@ -169,13 +169,13 @@ class Voice:
 
     def _plan(self, step: int) -> None:
         """Find the first step from `step` on at which an announcement is due, if all steps are made."""
-        (first, period), is_due = self._grid, self._mind.is_broadcast_due
+        (first, period), is_due = self._grid, self._mind.cadence.is_due
         before = first + (step - 1) * period
         while not is_due(now := first + step * period, before):
             before = now
             step += 1
         self._beat_step = step
-        self._due = self._mind.broadcast_due
+        self._due = self._mind.cadence.due
 
     def _spoken(self, said: Announce, now: float, first: int | None = None) -> Spoken:
         heard = Heard(self.name, said.task, said.active_for, said.expected)

@@ -271,6 +271,16 @@ def gives_way(expected: float, their_expected: float, they_come_first: bool) -> 
     return their_expected < expected or (their_expected == expected and they_come_first)
 
 
+def announces_from(due: float, step: float) -> float:
+    """The instant from which a control step makes the announcement that is due: it is the first nearest to that instant.
+
+    Args:
+        due: when it is due, in seconds.
+        step: from one control step to the next, in seconds.
+    """
+    return due - step / 2 - SLACK
+
+
 def occasion(lapsed: bool, present: bool) -> int:
     """Why a task on which somebody was heard can be taken: the place of the cause in `OCCASIONS` of `events`.
 

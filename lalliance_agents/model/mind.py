@@ -16,6 +16,7 @@ from collections.abc import Callable, Collection, Sequence
 
 from lalliance_agents.model import equations
 from lalliance_agents.model.appraisal import Appraisal, Moment
+from lalliance_agents.model.cadence import Cadence
 from lalliance_agents.model.events import (
     OCCASIONS,
     REASONS_TO_STOP,
@@ -70,10 +71,9 @@ class Mind:
         self._listener = Listener(me, self._sets, self.hearing, self.knowledge)
         self._learns = parameters.architecture is Architecture.L_ALLIANCE
         self._boredom_rate = parameters.effective_boredom_rate
-        self._broadcast_period = parameters.broadcast_period
+        self.cadence = Cadence(parameters.broadcast_period, now)
         self._roster: frozenset[str] | None = None
         self._before = now
-        self._broadcast_due = now
         self._pending: list[Command] = []
         self._many = parameters.is_literal(Erratum.ONE_ACTIVE)
         # Where motivation 0 is below the threshold, a set that is suppressed is 0 whatever else speaks for or against it.
@@ -364,26 +364,11 @@ class Mind:
         latest = teammates[0]
         return OCCASIONS[equations.occasion(latest.lapsed_at is not None, latest.present)], latest.robot
 
-    @property
-    def broadcast_due(self) -> float:
-        """The instant at which the next announcement is due."""
-        return self._broadcast_due
-
-    def is_broadcast_due(self, now: float, before: float) -> bool:
-        """Whether the step at `now`, after one at `before`, is to announce: it is the first nearest to the instant due."""
-        half_a_step = (now - before) / 2
-        return now >= self._broadcast_due - half_a_step - SLACK
-
     def beat(self, now: float) -> list[Announce]:
         """A step at `now` that does no more than a tick with nothing to decide: announce what is due."""
         before, self._before = self._before, now
         self.hearing.note_checked(now)
         return self._announce(now, before, urgent=False)
-
-    def keep_beat(self, now: float) -> None:
-        """Take the announcement due at the step `now` for made; what it would have said is `announcement`."""
-        kept = self._broadcast_due + self._broadcast_period
-        self._broadcast_due = kept if kept > now else now + self._broadcast_period
 
     def announcement(self, now: float) -> list[Announce]:
         """What there is to announce at `now`: nothing for an idle robot that keeps quiet (IDLE_HEARTBEAT, literal)."""
@@ -393,11 +378,10 @@ class Mind:
         return [Announce(None)] if self._beats else []
 
     def _announce(self, now: float, before: float, *, urgent: bool) -> list[Announce]:
-        """Broadcast at rate rho, by the tick nearest to the instant due, and at once on activation."""
         if urgent:
-            self._broadcast_due = now + self._broadcast_period
-        elif self.is_broadcast_due(now, before):
-            self.keep_beat(now)
+            self.cadence.begin_anew(now)
+        elif self.cadence.is_due(now, before):
+            self.cadence.keep(now)
         else:
             return []
         return self.announcement(now)

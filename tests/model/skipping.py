@@ -178,8 +178,8 @@ class Skipper(Driver):
             self.plan(index)
 
     def next_beat(self) -> int:
-        index = self.first_from(self.mind.broadcast_due - 2 * self.period)
-        while not self.mind.is_broadcast_due(self.grid(index), self.before(index)):
+        index = self.first_from(self.mind.cadence.due - 2 * self.period)
+        while not self.mind.cadence.is_due(self.grid(index), self.before(index)):
             index += 1
         return index
 
