@@ -238,7 +238,9 @@ def _least_messages(evidence: Evidence, sender: str, mate: str, since: float, un
 
 
 def _unheard(evidence: Evidence, sender: str, mate: str, since: float, until: float) -> bool:
-    """Whether `sender` was for a while on a task that `mate` cannot do, and so was not heard by it."""
+    """Whether `sender` was for a while on a task that `mate` cannot do, and was not heard by it (erratum 17, literal)."""
+    if not evidence.mission.parameters_of(mate).is_literal(Erratum.HEARD_ELSEWHERE):
+        return False
     shared = evidence.mission.robots[mate].tasks
     return any(
         one.robot == sender and one.task not in shared and one.since <= until and one.until >= since

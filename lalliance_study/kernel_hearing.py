@@ -19,6 +19,7 @@ announces_from = equations.announces_from
 censored = equations.censored
 credited = equations.credited
 goes_on = equations.goes_on
+is_heard = equations.is_heard
 leaves_no_trace = equations.leaves_no_trace
 may_have_done = equations.may_have_done
 more_than = equations.more_than
@@ -313,7 +314,8 @@ def arrive(w: Memory, rules: Rules, speaker: int) -> None:
         if w.r_dead[hearer]:
             continue
         news = False
-        hears = task == IDLE or w.place[hearer * TASKS + task] >= 0
+        shared = task >= 0 and w.place[hearer * TASKS + task] >= 0
+        hears = task != NOTHING and is_heard(task == IDLE, shared, rules.elsewhere)
         if hears:
             news = w.k_met[couple] == 0 or now - w.k_last[couple] > rules.tau - rules.step
             if w.k_met[couple] == 0:
@@ -321,7 +323,7 @@ def arrive(w: Memory, rules: Rules, speaker: int) -> None:
                 w.r_met[hearer] += 1
             w.k_live[couple] = 1
             _elsewhere(w, rules, hearer, speaker, task, now)
-            if task >= 0:
+            if shared:
                 _hear_on(w, rules, hearer, speaker, task, now)
                 news = True
         _tell(w, rules, hearer, task if hears else NOTHING, news, old_task, old_last)

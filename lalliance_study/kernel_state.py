@@ -23,6 +23,7 @@ from lalliance_agents.model.events import OCCASIONS, REASONS_TO_STOP
 from lalliance_agents.model.parameters import Architecture, Erratum, Learning, Ordering, Strategy
 from lalliance_study.compiled import Memory
 from lalliance_study.logbook import Timing
+from world_server.environments.task_pool import HAND_OVERS
 from world_server.world import TRIAL_PAUSE
 
 #: The largest mission: robots, tasks, pairs (tasks x width x width), and samples kept of each pair.
@@ -211,8 +212,7 @@ CAUSES = (*OCCASIONS, *REASONS_TO_STOP)
 FREE, SENSED = 0, len(OCCASIONS)
 BLAMELESS = np.array([cause.is_blameless for cause in CAUSES])
 
-SHARED_MAX, SHARED_ADD, RESTART = 0, 1, 2
-HAND_OVERS = ("shared_max", "shared_add", "restart")
+SHARED_MAX, SHARED_ADD, RESTART = range(len(HAND_OVERS))
 
 
 class Rules(NamedTuple):
@@ -254,6 +254,7 @@ class Rules(NamedTuple):
     credits_all: bool
     collisions: bool
     per_attempt: bool
+    elsewhere: bool
     step: float
     steps_per_second: float
     world_step: float
@@ -322,6 +323,7 @@ def rules_of(mission: Mission, timing: Timing | None = None) -> Rules:
         literal(Erratum.CREDIT),
         not literal(Erratum.COLLISION),
         not literal(Erratum.SECOND_PATIENCE),
+        not literal(Erratum.HEARD_ELSEWHERE),
         mission.control_period,
         1 / mission.control_period,
         timing.world_step,

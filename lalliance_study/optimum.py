@@ -24,7 +24,7 @@ Arrays are as in `assignments`. Robots and tasks are numbered in their order the
 import math
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +43,7 @@ from lalliance_study.assignments import (
     to_the_earliest,
 )
 from lalliance_study.extras import study_package
-from world_server.environments.task_pool import HandOver, TaskPool
+from world_server.environments.task_pool import HAND_OVERS, HandOver, TaskPool
 
 #: What is proven holds but for this share, unless another one is asked for.
 TOLERANCE = 1e-6
@@ -278,8 +278,8 @@ def optimum_of(
     if reason is not None:
         raise NoYardstickError(f"the optimum of mission {mission.name} is not known: {reason}")
     rule = hand_over or TaskPool.Options.model_validate(mission.environment.options).hand_over
-    if rule not in get_args(HandOver):
-        raise UserError(f"hand_over is {rule!r}; expected one of {', '.join(get_args(HandOver))}")
+    if rule not in HAND_OVERS:
+        raise UserError(f"hand_over is {rule!r}; expected one of {', '.join(HAND_OVERS)}")
     times = times_of(mission)
     if rule != "restart":
         return shared_optimum(times, rule)

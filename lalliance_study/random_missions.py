@@ -22,6 +22,7 @@ from lalliance_agents.model.parameters import Erratum
 from lalliance_study.promises import promise, settled_after
 from lalliance_study.random_faults import draw_faults, draw_stuck
 from world_server import environments
+from world_server.environments.task_pool import HAND_OVERS
 
 Document = dict[str, Any]
 """A mission file as plain values."""
@@ -113,7 +114,7 @@ def _some(chance: random.Random, among: Sequence[T], most: int) -> list[T]:
 
 
 def _pool(chance: random.Random) -> Document:
-    options: Document = {"kind": "task_pool", "hand_over": chance.choice(("shared_max", "shared_add", "restart"))}
+    options: Document = {"kind": "task_pool", "hand_over": chance.choice(HAND_OVERS)}
     if chance.random() < 0.4:
         options["noise"] = between(chance, 0.0, 0.3)
     return options

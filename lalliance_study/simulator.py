@@ -16,7 +16,9 @@ from lalliance_agents.bus.base import LEASE
 from lalliance_agents.bus.link import LinkRules
 from lalliance_agents.config import Mission
 from lalliance_agents.faults import Fault
+from lalliance_agents.model.equations import is_heard
 from lalliance_agents.model.events import Decision
+from lalliance_agents.model.parameters import Erratum
 from lalliance_agents.wire.messages import Action, DecisionMade, LinkReport
 from lalliance_study.air import AirLink
 from lalliance_study.circumstances import Circumstances, Mishaps
@@ -97,8 +99,9 @@ class Simulator:
                 links.append(link)
                 hearer.hears.append(link)
                 member.voice.idle.append(link)
+                elsewhere = not self.mission.parameters_of(mate).is_literal(Erratum.HEARD_ELSEWHERE)
                 for task in member.tasks:
-                    if task in hearer.tasks:
+                    if is_heard(False, task in hearer.tasks, elsewhere):
                         member.voice.on[task].append(link)
         return links
 

@@ -25,6 +25,7 @@ from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import MissionError
 from lalliance_agents.model.events import Activate, Announce, BodyFailed, Command, Deactivate, TrialStarted
+from lalliance_agents.model.parameters import Erratum
 from lalliance_agents.wire.keys import Key, Keys, Kind
 from lalliance_agents.wire.messages import Activity, BodyState, Heartbeat, Hello, Message, TaskState
 
@@ -80,6 +81,7 @@ class Robot:
         self.name = name
         self._mission = mission
         self._world = world
+        self._hears_elsewhere = not mission.parameters_of(name).is_literal(Erratum.HEARD_ELSEWHERE)
         self._clock = clock or MissionClock()
         self._catalog = catalog
         if incarnation is None:
@@ -136,8 +138,9 @@ class Robot:
         keys, listen = self._keys, self._messenger.listen
         if self._world:  # before the first message comes to which a rule applies
             await self._bus.obey(timeout=GREETING_TIMEOUT)
-        for task in self._repertoire:
-            await listen(keys.build(Kind.ACTIVITY, task=task), self._receive_presence)
+        if not self._hears_elsewhere:
+            for task in self._repertoire:
+                await listen(keys.build(Kind.ACTIVITY, task=task), self._receive_presence)
         for teammate in self._team.abilities:
             await self._listen_to(teammate)
         await listen(keys.build(Kind.HELLO), self._receive_hello)
@@ -219,7 +222,10 @@ class Robot:
             listening.add_done_callback(self._listening.discard)
 
     async def _listen_to(self, teammate: str) -> None:
-        await self._messenger.listen(self._keys.build(Kind.HEARTBEAT, robot=teammate), self._receive_presence)
+        listen = self._messenger.listen
+        await listen(self._keys.build(Kind.HEARTBEAT, robot=teammate), self._receive_presence)
+        if self._hears_elsewhere:
+            await listen(self._keys.build(Kind.ACTIVITY, robot=teammate), self._receive_presence)
 
     def _enter_trial(self, trial: int, learning: str) -> None:
         if trial <= self._trial:

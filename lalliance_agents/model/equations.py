@@ -281,6 +281,17 @@ def announces_from(due: float, step: float) -> float:
     return due - step / 2 - SLACK
 
 
+def is_heard(idle: bool, shared: bool, elsewhere: bool) -> bool:
+    """Whether a robot hears what a teammate that shares a task with it says (erratum 17).
+
+    Args:
+        idle: whether the teammate is on no task.
+        shared: whether the robot itself can do the task that the teammate is on.
+        elsewhere: whether it hears teammates also on tasks that it cannot do.
+    """
+    return idle or shared or elsewhere
+
+
 def occasion(lapsed: bool, present: bool) -> int:
     """Why a task on which somebody was heard can be taken: the place of the cause in `OCCASIONS` of `events`.
 

@@ -90,6 +90,8 @@ class Erratum(StrEnum):
     COLLISION = "collision"
     #: 16. A second attempt gets no patience (the default) -> patience counts from the current attempt.
     SECOND_PATIENCE = "second_patience"
+    #: 17. A teammate at work on what the robot cannot do is not heard, and so not present -> it is heard, as if idle.
+    HEARD_ELSEWHERE = "heard_elsewhere"
 
     @property
     def default(self) -> Reading:

@@ -2,7 +2,7 @@
 
 Every key begins with `lalliance/<mission>/`. What follows:
 
-    activity/<task>/<robot>     robot -> teammates   "I am on this task"
+    activity/<task>/<robot>     robot -> teammates   "I am on this task"; also to those who cannot do it
     heartbeat/<robot>           robot -> teammates   "I am here, idle"
     hello/<robot>               robot -> teammates   the tasks it can do
     body/<robot>/action         robot -> world       what the body works on

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 from lalliance_agents.model.parameters import Record
 from lalliance_study.experiments.contenders import Contender
 from lalliance_study.scenarios import Scenario
-
-HAND_OVERS = ("shared_max", "shared_add", "restart")
+from world_server.environments.task_pool import HAND_OVERS
 
 
 class Team(NamedTuple):

@@ -6,7 +6,6 @@ from string import Template
 
 import numpy as np
 
-from lalliance_study.experiments.plan import HAND_OVERS
 from lalliance_study.report.claims import REFUTED, SOMEWHERE, Claim, Finding
 from lalliance_study.report.comparisons import MARGIN
 from lalliance_study.report.independent import ALIKE, known
@@ -14,6 +13,7 @@ from lalliance_study.report.markdown import figure, number, table
 from lalliance_study.report.results import FEWEST, Measured, Results
 from lalliance_study.report.sections import CLAIMS, SECTIONS, Section
 from lalliance_study.report.statistics import CONFIDENCE
+from world_server.environments.task_pool import HAND_OVERS
 
 Findings = Mapping[str, Mapping[str, Finding]]
 """What became of each claim, by its key and hand-over."""

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from lalliance_study.experiments.plan import HAND_OVERS
 from lalliance_study.report import statistics
 from lalliance_study.report.beyond import (
     LEARNERS,
@@ -22,6 +21,7 @@ from lalliance_study.report.markdown import folded, number, table
 from lalliance_study.report.optima import DERIVED, NEAR, log_mean, proven, size
 from lalliance_study.report.results import Measured
 from lalliance_study.report.statistics import Floats
+from world_server.environments.task_pool import HAND_OVERS
 
 
 def rivals(found: Sequence[Measured]) -> str:

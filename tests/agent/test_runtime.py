@@ -255,7 +255,25 @@ async def test_strangers_are_listened_to_once_follow_their_abilities_and_are_not
         assert team.abilities == {"right": {"a"}, "stranger": {"b"}, "made-up-0": {"a"}}
         stage.voice("made-up-9").send(Kind.ACTIVITY, key_task="a", task="a", trial=1, active_for=1.0, expected=1.0)
         await asyncio.sleep(0.05)
-        assert stage.robot._messenger.dropped == {"stranger": 1}
+        assert "made-up-9" not in stage.robot.mind.hearing.silences(0.0)
+
+
+@pytest.mark.parametrize(("reading", "heard"), [("mended", {"right", "stranger"}), ("literal", {"stranger"})])
+async def test_a_teammate_is_heard_on_what_the_robot_cannot_do_unless_the_appendix_is_read_literally(
+    reading: str, heard: set[str]
+) -> None:
+    text = PAIR.replace("}}\nknowledge", ", c: 3}}\nknowledge").replace("b: {}}", "b: {}, c: {}}")
+    text = text.replace("max_delay: 0.5", f"max_delay: 0.5, readings: {{heard_elsewhere: {reading}}}")
+    async with Stage(mission=mission(text)) as stage:
+        await stage.begin()
+        stage.voice("stranger").send(Kind.HELLO, tasks=["a", "d"])
+        await asyncio.sleep(1.5)
+        for name, task in (("right", "c"), ("stranger", "a")):
+            stage.voice(name).send(Kind.ACTIVITY, key_task=task, task=task, trial=1, active_for=0.0, expected=1.0)
+        await asyncio.sleep(0.05)
+        assert stage.robot.mind.hearing.silences(0.0).keys() == heard
+        assert stage.robot._messenger.dropped == {}
+        assert [contact.robot for contact in stage.robot.mind.hearing.contacts("a")] == ["stranger"]
 
 
 async def test_robots_of_the_mission_are_known_before_any_made_up_one_can_take_their_place(

@@ -9,6 +9,7 @@ import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from lalliance_agents.model.equations import is_heard
 from lalliance_agents.model.events import (
     Activate,
     Announce,
@@ -21,7 +22,7 @@ from lalliance_agents.model.events import (
 )
 from lalliance_agents.model.mind import Mind
 from lalliance_agents.model.monitor import Record
-from lalliance_agents.model.parameters import Learning, Parameters
+from lalliance_agents.model.parameters import Erratum, Learning, Parameters
 
 Ghost = Callable[[float], Announce | None]
 
@@ -143,9 +144,10 @@ class Arena:
                 self.left.pop(work, None)
 
     def _broadcast(self, sender: str, command: Announce) -> None:
+        elsewhere = not self.parameters.is_literal(Erratum.HEARD_ELSEWHERE)
         for receiver, mind in self.minds.items():
-            shares = command.task is None or command.task in self.abilities[receiver]
-            if receiver != sender and self.alive(receiver) and shares and self.deliver(sender, receiver, self.now):
+            heard = is_heard(command.task is None, command.task in self.abilities[receiver], elsewhere)
+            if receiver != sender and self.alive(receiver) and heard and self.deliver(sender, receiver, self.now):
                 mind.handle(Heard(sender, command.task, command.active_for, command.expected), self.now)
 
     def go(self, until: float) -> list[str]:

@@ -1,4 +1,4 @@
-"""Each of the sixteen doubtful places of the Appendix, in both readings: what the literal one costs, in one small scenario.
+"""Each of the seventeen doubtful places of the Appendix, in both readings: what the literal one costs, in one small scenario.
 
 The robot that is looked at is called "me" where its teammates are scripted; see `test_mind` for the times at hand.
 """
@@ -32,7 +32,7 @@ def in_both_readings(erratum: Erratum, abilities: dict[str, dict[str, float]], *
 def test_all_are_mended_by_default_but_the_patience_with_a_second_attempt() -> None:
     literal = [erratum for erratum in Erratum if Parameters().is_literal(erratum)]
     assert literal == [Erratum.SECOND_PATIENCE]
-    assert len(Erratum) == 16
+    assert len(Erratum) == 17
 
 
 def test_1_learned_influence_on_the_active_set() -> None:
@@ -222,6 +222,16 @@ def test_16_patience_with_a_second_attempt() -> None:
     )
     assert literal.go(13)[-1] == "10.2 me activate x impatience a"
     assert mended.go(13)[-1] == "12.1 me activate x impatience a"
+
+
+def test_17_teammates_heard_elsewhere() -> None:
+    """A does x better, and is on y, which this robot cannot do: that is no reason to take it for dead."""
+    literal, mended = in_both_readings(
+        Erratum.HEARD_ELSEWHERE, ALONE, known={"x": {"me": 5, "a": 3}}, ghosts={"a": ghost(("y", 0.5, inf))}
+    )
+    assert literal.go(3) == ["1.5 me activate x free"]
+    assert mended.go(3) == ["2.1 me activate x free"]
+    assert [arena.log[0][2].factors.category for arena in (literal, mended)] == [1, 2]
 
 
 def test_a_failed_attempt_is_remembered_over_a_restart_of_the_process() -> None:

@@ -69,23 +69,23 @@ def decisions(commands: list[Command]) -> list[Decision]:
     [
         (
             Strategy.I,  # phi of b is its own 5 s; psi of a is its own 9 s, and it completes first
-            ["8.2 b activate x impatience a", "9.2 a complete x sensed", "9.2 b complete x sensed"],
+            ["8.2 b activate x impatience a", "9.3 a complete x sensed", "9.3 b complete x sensed"],
         ),
         (
             Strategy.II,  # phi of b is its own 5 s; psi of a is the best time of the team, 5 s
-            ["8.2 b activate x impatience a", "8.3 a yield x contender b", "9.6 b complete x sensed"],
+            ["8.2 b activate x impatience a", "8.3 a yield x contender b", "9.9 b complete x sensed"],
         ),
         (
             Strategy.III,  # phi of b is the time of a, 9 s: a is left to complete the task
-            ["10.8 a complete x sensed"],
+            ["11.2 a complete x sensed"],
         ),
     ],
 )
 def test_each_strategy_hands_a_task_over_in_its_own_way(strategy: Strategy, log: list[str]) -> None:
-    """B is better at x but busy with y; a is on x when b comes free at 6.9, is bored at 8.1 and takes the task at 8.2."""
+    """B is better at x but busy with y, so a takes x when it is bored; b comes free at 6.9, is bored at 8.1, takes x at 8.2."""
     arena = Arena({"a": {"x": 9.0}, "b": {"x": 5.0, "y": 6.0}}, Parameters(strategy=strategy), given=True)
     arena.run(60)
-    assert arena.told() == ["0.9 b activate y free", "1.8 a activate x free", "6.9 b complete y sensed", *log]
+    assert arena.told() == ["0.9 b activate y free", "2.2 a activate x free", "6.9 b complete y sensed", *log]
 
 
 @pytest.mark.parametrize(("strategy", "at"), [(Strategy.I, 6.1), (Strategy.II, 6.1), (Strategy.III, 10.1)])

@@ -1,7 +1,6 @@
 """Messages: what is packed comes back, and whatever else comes in is a `MessageError` and nothing more."""
 
 import random
-import time
 import tracemalloc
 from typing import Any
 
@@ -220,13 +219,14 @@ def test_what_is_not_even_a_document_is_refused_with_its_reason(payload: bytes, 
         (messages.DecisionMade, {"teammates": [{"a": []}] * 30_000}),
     ],
 )
-def test_a_message_with_very_many_faults_is_refused_quickly(kind: type[Message], fields: dict[str, object]) -> None:
+def test_of_very_many_faults_only_the_first_is_looked_up(kind: type[Message], fields: dict[str, object]) -> None:
     """Spelling out 100,000 faults takes half a second, in which a robot would hear and do nothing."""
     payload = msgpack.packb({**HEADER, **fields})
     assert len(payload) <= MAX_PAYLOAD
-    began = time.process_time()
-    refusal(kind, payload)
-    assert time.process_time() - began < 0.4
+    assert refusal(kind, payload).reason == "content"
+    with pytest.raises(ValidationError) as refused:
+        kind.model_validate({**HEADER, **fields})
+    assert refused.value.error_count() <= 5  # of one value, as each of the kinds that it could be
 
 
 @pytest.mark.parametrize("kind", BODY_OF)

@@ -18,7 +18,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Literal, Protocol, get_args
 from zlib import crc32
 
 import numpy as np
@@ -32,6 +32,7 @@ from world_server.environments.base import EventDriven, TaskView, Work
 ROUNDING = 1e-15
 
 HandOver = Literal["shared_max", "shared_add", "restart"]
+HAND_OVERS: tuple[HandOver, ...] = get_args(HandOver)
 
 
 def deviation(seed: int, robot: str, task: str, number: int) -> float:
