@@ -226,7 +226,7 @@ def test_of_very_many_faults_only_the_first_is_looked_up(kind: type[Message], fi
     assert refusal(kind, payload).reason == "content"
     with pytest.raises(ValidationError) as refused:
         kind.model_validate({**HEADER, **fields})
-    assert refused.value.error_count() <= 5  # of one value, as each of the kinds that it could be
+    assert refused.value.error_count() < 20  # those of a field that is missing, or of one value, are told one by one
 
 
 @pytest.mark.parametrize("kind", BODY_OF)
