@@ -4,7 +4,7 @@ BIN := .venv/bin
 SETUP := .venv/.set-up
 
 # Tests that start no processes may run side by side; the others need the machine for themselves.
-SIDE_BY_SIDE := tests/agent tests/model tests/study tests/wire tests/world tests/test_mission_file.py
+SIDE_BY_SIDE := tests/agent tests/model tests/study tests/wire tests/world tests/test_mission_file.py tests/test_whole_file.py
 
 .PHONY: demo test test-compose campaign check clean
 

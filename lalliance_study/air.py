@@ -16,6 +16,7 @@ from typing import NamedTuple, Protocol
 
 from lalliance_agents.bus.link import RuledLink
 from lalliance_agents.model.events import Heard
+from lalliance_agents.model.parameters import EARLY
 
 
 class Spoken(NamedTuple):
@@ -68,10 +69,6 @@ class Speaker(Protocol):
 
     def unsettle(self, now: float) -> None:
         """Somebody waits for what it says next: from now on its announcements go out one by one."""
-
-
-#: A silence is news a little before the hearer could notice it, in seconds.
-EARLY = 1e-6
 
 
 class AirLink:

@@ -20,7 +20,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 # The kernel's loops are short: to do several passes at once costs time, and much more to compile.
-numba.config.LOOP_VECTORIZE = numba.config.SLP_VECTORIZE = 0  # type: ignore[attr-defined]
+numba.config.LOOP_VECTORIZE = numba.config.SLP_VECTORIZE = 0  # type: ignore[attr-defined] # untyped
 
 _njit: Callable[..., Any] = numba.njit
 _unliteral: Callable[[types.Type], types.Type] = types.unliteral

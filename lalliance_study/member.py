@@ -255,10 +255,10 @@ class Member:
             self._lapse_step = step
             self._schedule()
 
-    def _listen(self, now: float, *, each: bool = False, to_all: bool = True) -> None:
-        """Take in what has come until `now`: of rows of refreshes the last, or `each`; `to_all`, or to whom nobody heeds."""
+    def _listen(self, now: float, *, each: bool = False, settled: bool = True) -> None:
+        """Take in what has come until `now`: of rows of refreshes the last, or `each`; on `settled` links too, or not."""
         for link in self.hears:
-            if (link.settled and to_all) or link.waiting:
+            if (link.settled and settled) or link.waiting:
                 self._take(link, now, each=each)
         self._heed(now)
 
@@ -296,7 +296,7 @@ class Member:
         whole = step >= self._wake_step
         if not whole and step >= self._lapse_step:
             self._step = step
-            self._listen(now, to_all=False)
+            self._listen(now, settled=False)
             self._lapse_step = self._step_from(mind.next_lapse(self.heeded))
             whole = step >= self._lapse_step or step >= self._wake_step
         if whole or step >= self.voice.due_step:

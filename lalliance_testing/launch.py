@@ -116,6 +116,6 @@ def _engine(kind: str, path: Path, mission: Mission, speed: float) -> Engine:
         from lalliance_testing.twin import Twin  # noqa: PLC0415 - neither engine needs what the other one is made of
 
         return Twin(mission)
-    from lalliance_testing.real import Real  # noqa: PLC0415
+    from lalliance_testing.real import Real  # noqa: PLC0415 - the same
 
     return Real(path, mission, speed)

@@ -1,7 +1,6 @@
 """Summaries of missions that are over: kept in a file, found there, and told."""
 
 import json
-import os
 import tempfile
 import time
 from collections.abc import Mapping
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from lalliance_agents.errors import UserError
+from lalliance_agents.whole_file import written_whole
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -39,10 +39,8 @@ def check_place(path: Path) -> None:
 
 def keep(summary: Mapping[str, Any], path: Path) -> None:
     """Write a summary; a reader finds all of it or none."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        json.dump(summary, file)
-    Path(name).replace(path)
+    with written_whole(path) as file:
+        file.write(json.dumps(summary).encode())
 
 
 def kept_summary(path: Path, *, wait: bool) -> dict[str, Any]:

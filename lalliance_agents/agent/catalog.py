@@ -7,7 +7,6 @@ what was learned of tasks that the present mission does not have.
 
 import json
 import logging
-import os
 import tempfile
 import time
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lalliance_agents.errors import UserError
 from lalliance_agents.model.monitor import Record
+from lalliance_agents.whole_file import written_whole
 from lalliance_agents.wire.messages import LONGEST
 
 _log = logging.getLogger(__name__)
@@ -138,16 +138,8 @@ class Catalog:
                 for task, records in {**self.learned, **learned}.items()
             },
         }
-        handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=f".{self.path.name}.")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                json.dump(document, file, indent=1)
-                file.flush()
-                os.fsync(file.fileno())
-            Path(name).replace(self.path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
+        with written_whole(self.path) as file:
+            file.write(json.dumps(document, indent=1).encode())
 
 
 def _records(stored: _Stored) -> Learned:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from lalliance_agents.bus.credentials import ROUTER
-from lalliance_agents.wire.keys import OPERATOR, ROOT, WORLD, Keys, Kind
+from lalliance_agents.wire.keys import OF_ROBOT, OF_WORLD, OPERATOR, ROOT, WORLD, Keys, Kind
 
 Rule = dict[str, Any]
 
@@ -21,17 +21,6 @@ _EVERYTHING = [f"{ROOT}/**", f"{ROOT}/*/@chaos/**"]
 _PRESENCES = (Kind.ALIVE, Kind.LAUNCHER)
 #: Last values, which their owners also answer queries with.
 _ANSWERED = (Kind.HELLO, Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.CHAOS_RULES)
-_OF_ROBOT = (
-    Kind.ACTIVITY,
-    Kind.HEARTBEAT,
-    Kind.HELLO,
-    Kind.ACTION,
-    Kind.DECISION,
-    Kind.MOTIVATION,
-    Kind.LINK,
-    Kind.ALIVE,
-)
-_OF_WORLD = (Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.EVENT, Kind.STATUS, Kind.CHAOS_RULES)
 #: An operator who launches a mission also holds its processes.
 _OF_OPERATOR = (Kind.CHAOS_DEED, Kind.LAUNCHER)
 
@@ -42,8 +31,8 @@ def access_control(robots: Iterable[str]) -> dict[str, Any]:
     Args:
         robots: the names of all its robots.
     """
-    own = {name: list(_speaking(name, _OF_ROBOT)) for name in robots}
-    own[WORLD] = [*_speaking(WORLD, _OF_WORLD), _answer(f"{WORLD} carries out", [Kind.CHAOS_COMMAND])]
+    own = {name: list(_speaking(name, OF_ROBOT)) for name in robots}
+    own[WORLD] = [*_speaking(WORLD, OF_WORLD), _answer(f"{WORLD} carries out", [Kind.CHAOS_COMMAND])]
     own[OPERATOR] = [
         *_speaking(OPERATOR, _OF_OPERATOR),
         _rule(f"{OPERATOR} commands", ["query"], _keys([Kind.CHAOS_COMMAND])),

@@ -90,8 +90,10 @@ class Key(NamedTuple):
         return (self.kind.format(robot=self.robot, task=self.task), None)
 
 
-_OF_WORLD = (Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.EVENT, Kind.STATUS, Kind.CHAOS_RULES)
-_SPEAKERS = {**dict.fromkeys(_OF_WORLD, WORLD), Kind.CHAOS_COMMAND: OPERATOR, Kind.CHAOS_DEED: LAUNCHER}
+#: What the world says, and what each robot says, is asked for last values of, or is present with, in its own name.
+OF_WORLD = (Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.EVENT, Kind.STATUS, Kind.CHAOS_RULES)
+OF_ROBOT = tuple(kind for kind in Kind if "{robot}" in kind.value and kind not in OF_WORLD)
+_SPEAKERS = {**dict.fromkeys(OF_WORLD, WORLD), Kind.CHAOS_COMMAND: OPERATOR, Kind.CHAOS_DEED: LAUNCHER}
 
 
 def _shapes() -> dict[tuple[str, ...], Kind]:

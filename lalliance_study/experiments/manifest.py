@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from lalliance_agents.errors import UserError
 from lalliance_agents.model.parameters import Record
+from lalliance_agents.whole_file import written_whole
 from lalliance_study.experiments.contenders import Contender
 from lalliance_study.experiments.plan import Numbered, numbered
 from lalliance_study.experiments.presets import Preset
@@ -102,10 +103,9 @@ class Manifest(Record):
             UserError: it cannot be written.
         """
         path = out / FILE
-        unfinished = path.with_suffix(".unfinished")
         try:
-            unfinished.write_text(self.model_dump_json(indent=1) + "\n")
-            unfinished.replace(path)
+            with written_whole(path) as file:
+                file.write(f"{self.model_dump_json(indent=1)}\n".encode())
         except OSError as error:
             raise UserError(f"{path}: {error.strerror}; expected a folder that can be written to") from None
 

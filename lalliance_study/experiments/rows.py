@@ -17,13 +17,13 @@
 Optima are null where the experiment does not ask for them.
 """
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 
 import polars as pl
 
 from lalliance_agents.errors import UserError
+from lalliance_agents.whole_file import written_whole
 from lalliance_study.experiments.manifest import Manifest
 
 SCHEMA = pl.Schema(
@@ -68,13 +68,9 @@ def write(out: Path, part: str, found: pl.DataFrame) -> None:
         UserError: they cannot be written.
     """
     path = path_of(out, part)
-    unfinished = path.with_suffix(".unfinished")
     try:
-        with unfinished.open("wb") as file:
+        with written_whole(path) as file:
             found.write_parquet(file)
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}; the rows could not be written") from None
 

@@ -147,7 +147,10 @@ def circumstances(scenario: Scenario) -> str:
 #: What scenarios may differ in, and how a level of it is spelled.
 PROPERTIES: Mapping[str, Callable[[Scenario], tuple[float, str]]] = {
     "heterogeneity": lambda one: (one.heterogeneity, f"{one.heterogeneity:g} %"),
-    "whether all hear of all work": lambda one: (0, "they do" if one.coverage >= one.robots else "they do not"),
+    "whether every robot can do every task": lambda one: (
+        0,
+        "they can" if one.coverage >= one.robots else "they cannot",
+    ),
     "coverage": lambda one: (one.coverage, f"{one.coverage}"),
     "tasks per robot": lambda one: (one.tasks / one.robots, f"{one.tasks / one.robots:.2g}"),
     "team size": lambda one: (one.robots, f"{one.robots} robots"),

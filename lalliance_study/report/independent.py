@@ -81,8 +81,8 @@ def _optima(results: Results) -> list[Known]:
     found = []
     for rule, mean, most in (("shared_max", 1.053, 1.28), ("restart", 1.108, 1.61)):
         own = [one for one in results.of("optimum") if one.scenario.hand_over == rule]
-        all_hear = [one for one in own if one.scenario.coverage >= one.scenario.robots]
-        for told, some in ((rule, own), (f"{rule}, where every robot can do every task", all_hear)):
+        all_alike = [one for one in own if one.scenario.coverage >= one.scenario.robots]
+        for told, some in ((rule, own), (f"{rule}, where every robot can do every task", all_alike)):
             samples = _samples(some)
             farthest = Estimate(float(np.concatenate(samples).max()), np.nan, np.nan) if samples else None
             found.append(Known(f"mean ratio to the optimum, {told}", mean, _mean(samples)))

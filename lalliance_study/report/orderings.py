@@ -51,12 +51,14 @@ def derived_instead(found: Sequence[Measured]) -> Finding:
     ours, rival = "II/derived", "II/shortest_first"
     compared = [one.compare(ours, rival) for one in found]
     ratio = ratio_of(compared)
-    told = " ".join(filter(None, [said(ours, rival, ratio), *_by_hearing(compared), unfinished(compared, ours, rival)]))
+    told = " ".join(
+        filter(None, [said(ours, rival, ratio), *_by_coverage(compared), unfinished(compared, ours, rival)])
+    )
     return judge(answers_of(found, ours, [rival]), ratio, told)
 
 
-def _by_hearing(compared: Sequence[Comparison]) -> list[str]:
-    """The ratio where all robots hear of all work, and where not."""
+def _by_coverage(compared: Sequence[Comparison]) -> list[str]:
+    """The ratio where every robot can do every task, and where not."""
     told = []
     for everybody, where in ((True, "every robot can do every task"), (False, "some tasks are not for all robots")):
         own = [one for one in compared if (one.scenario.coverage >= one.scenario.robots) == everybody]

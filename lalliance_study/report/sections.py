@@ -94,7 +94,7 @@ SECTIONS = (
             Drawing(
                 "optimum-distribution",
                 "Share of single missions within each multiple of the optimum, strategy II. Left every robot can do every "
-                "task, so that all hear of all work.",
+                "task.",
                 optimum_figures.distribution,
             ),
             Drawing(

@@ -199,7 +199,7 @@ def test_an_ordering_that_needs_all_to_hear_all_depends_on_that() -> None:
 
     sizes = [one.model_copy(update={"robots": robots}) for one in scenarios(coverage=(2, 3)) for robots in (2, 3, 4)]
     found = verdict("derived-in-small-teams", measured([one for one in sizes if one.coverage <= one.robots], heard))
-    assert found.word == "depends on whether all hear of all work"
+    assert found.word == "depends on whether every robot can do every task"
     assert "Where every robot can do every task: 0.91" in found.detail
     assert "Where some tasks are not for all robots: 1.083" in found.detail
 
