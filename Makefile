@@ -3,9 +3,6 @@ PYTHON ?= python3
 BIN := .venv/bin
 SETUP := .venv/.set-up
 
-# Tests that start no processes may run side by side; the others need the machine for themselves.
-SIDE_BY_SIDE := tests/agent tests/model tests/study tests/wire tests/world tests/test_mission_file.py tests/test_whole_file.py
-
 .PHONY: demo test test-compose campaign check clean
 
 $(SETUP): pyproject.toml constraints.txt
@@ -18,8 +15,8 @@ demo: $(SETUP)  ## a team of robot processes finishes a mission although one of 
 	$(BIN)/lalliance run missions/material_handling.yaml
 
 test: $(SETUP)
-	$(BIN)/pytest --numprocesses auto $(SIDE_BY_SIDE)
-	$(BIN)/pytest $(addprefix --ignore=,$(SIDE_BY_SIDE) tests/compose)
+	$(BIN)/pytest -m "not alone" --numprocesses auto
+	$(BIN)/pytest -m alone
 
 test-compose: $(SETUP)  ## the real image and the deployment, in a docker daemon of its own; needs root on Debian
 	tests/compose/with_docker.sh $(BIN)/pytest -s tests/compose

@@ -94,6 +94,7 @@ def test_bad_input_is_refused_in_a_sentence(processes: Processes, case: str) -> 
     assert len(list(processes.folder.iterdir())) == 1
 
 
+@pytest.mark.alone
 def test_ctrl_c_ends_it_within_two_seconds_and_it_tells_what_it_has(processes: Processes) -> None:
     running = processes.start("campaign", "--missions", "1000000", "--jobs", "2")
     time.sleep(4.0)

@@ -10,6 +10,8 @@ from support.processes import Processes, read_until, until
 
 from lalliance_agents.bus.router import free_endpoint
 
+pytestmark = pytest.mark.alone
+
 PAIR = """
 name: pair
 tasks: {a: {}}

@@ -13,6 +13,8 @@ from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.faults import LinkFault, kind_of
 from lalliance_agents.mission_file import parse_mission
 
+pytestmark = pytest.mark.alone
+
 README = (MISSIONS.parent / "README.md").read_text()
 
 

@@ -6,6 +6,8 @@ import pytest
 
 from mission_control.running import announced, endpoints
 
+pytestmark = pytest.mark.alone
+
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

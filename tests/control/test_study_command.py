@@ -1,5 +1,6 @@
 """`lalliance study run`: what it prints, what it keeps, how it is ended, and what it refuses."""
 
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from lalliance_study.experiments import rows
 from lalliance_study.experiments.manifest import FILE, Manifest
 from lalliance_study.experiments.presets import preset
 from lalliance_study.experiments.runner import open_study
+from lalliance_study.report.sections import CLAIMS
 
 
 @pytest.fixture
@@ -23,34 +25,30 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
 
 
 @pytest.mark.timeout(600)
-def test_a_study_is_carried_out_once(processes: Processes) -> None:
-    """The kernel is compiled for it, which takes its time."""
-    command = (
-        "study",
-        "run",
-        "--preset",
-        "mini",
-        "--out",
-        "out",
-        "--missions",
-        "1",
-        "--only",
-        "optimum",
-        "--jobs",
-        "1",
-    )
+def test_the_smallest_study_is_carried_out_once_and_reported(processes: Processes) -> None:
+    """All experiments, on all cores: less than a minute on two that are free."""
+    command = ("study", "run", "--preset", "mini", "--out", "out")
     done = processes.run(*command, timeout=500)
-    assert (done.returncode, done.stdout) == (0, "36 rows of study mini are in out\n"), done.stderr
-    found = rows.read(processes.folder / "out")
-    assert found.height == 36
-    assert found["proven"].all()
-    assert Manifest.read(processes.folder / "out").missions == 1
-    before = {path: path.stat().st_mtime_ns for path in (processes.folder / "out").rglob("*")}
+    assert (done.returncode, done.stdout) == (0, "12320 rows of study mini are in out\n"), done.stderr
+    out = processes.folder / "out"
+    found = rows.read(out)
+    assert found.height == 12_320
+    assert found.filter(experiment="optimum")["proven"].all()
+    assert Manifest.read(out).missions == 4
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*")}
     again = processes.run(*command)
     assert (again.returncode, again.stdout, again.stderr) == (0, done.stdout, "")
-    assert {path: path.stat().st_mtime_ns for path in (processes.folder / "out").rglob("*")} == before
+    assert {path: path.stat().st_mtime_ns for path in out.rglob("*")} == before
+    told = processes.run("study", "report", "out", timeout=300)
+    assert told.returncode == 0, told.stderr
+    page = (out / "report" / "report.md").read_text()
+    assert all(f"### {claim.title}\n" in page for claim in CLAIMS)
+    drawn = set(re.findall(r"\]\(([\w-]+)\.png\)", page))
+    assert drawn
+    assert all((out / "report" / f"{name}{kind}").stat().st_size > 0 for name in drawn for kind in (".png", ".svg"))
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("processes_at_least", [2, 4])
 def test_whoever_is_told_to_end_says_how_to_go_on(

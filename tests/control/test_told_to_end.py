@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from support.processes import MISSIONS, Processes, until
 
+pytestmark = pytest.mark.alone
+
 INTERRUPTING = """
 import signal, sys
 

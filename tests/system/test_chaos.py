@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from support.processes import Processes, is_stopped, read_until, until, words_of
 
+pytestmark = pytest.mark.alone
+
 TEAM = """
 name: team
 tasks: {a: {}, b: {}}

@@ -11,6 +11,8 @@ from support.processes import MISSIONS, Processes, read_until, until
 from lalliance_agents.bus.router import free_endpoint
 from mission_control.keeper import RESTARTS
 
+pytestmark = pytest.mark.alone
+
 SMALL = """
 name: small
 tasks: {a: {}, b: {}, c: {}}

@@ -18,6 +18,8 @@ from lalliance_agents.errors import BusError
 from lalliance_agents.wire.keys import OPERATOR, WORLD, Keys, Kind
 from lalliance_agents.wire.messages import ChaosCommand, encode
 
+pytestmark = pytest.mark.alone
+
 TEAM = """\
 name: team
 tasks: {a: {}, b: {}, c: {after: [a]}, d: {after: [b]}}

@@ -6,6 +6,8 @@ import pytest
 import yaml
 from support.processes import MISSIONS, Processes
 
+pytestmark = pytest.mark.alone
+
 NAMES = ["material_handling", "box_pushing", "hazardous_waste", "janitorial"]
 
 

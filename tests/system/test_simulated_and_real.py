@@ -6,6 +6,8 @@ import pytest
 import yaml
 from support.processes import MISSIONS, Processes
 
+pytestmark = pytest.mark.alone
+
 
 @pytest.mark.parametrize(("name", "speed"), [("material_handling", "4"), ("box_pushing", "3")])
 def test_without_faults_they_agree_within_five_percent(

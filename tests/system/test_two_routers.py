@@ -14,6 +14,7 @@ from support.processes import Processes, read_until
 from support.secured import new_keys
 
 pytestmark = [
+    pytest.mark.alone,
     pytest.mark.timeout(300),
     pytest.mark.skipif(
         os.geteuid() != 0 or shutil.which("ip") is None, reason="needs root and iproute2 for network namespaces"

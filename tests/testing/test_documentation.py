@@ -9,6 +9,8 @@ from support.processes import MISSIONS, Processes
 
 from lalliance_testing.happenings import KINDS
 
+pytestmark = pytest.mark.alone
+
 DOCUMENT = (MISSIONS.parent / "docs" / "testing.md").read_text()
 README = (MISSIONS.parent / "README.md").read_text()
 

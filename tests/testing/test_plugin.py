@@ -13,6 +13,8 @@ import lalliance_testing.twin  # noqa: F401
 from lalliance_agents.mission_file import parse_mission
 from lalliance_study.simulator import Simulator
 
+pytestmark = pytest.mark.alone
+
 pytest_plugins = "pytester"
 
 MISSION = '''

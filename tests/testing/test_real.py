@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from support.processes import Processes, read_until, until
 
+pytestmark = pytest.mark.alone
+
 MISSION = """
 name: pair
 tasks: {a: {}, b: {}}
