@@ -267,7 +267,7 @@ class Simulator:
             incarnation=member.incarnation,
             seq=self._seq,
             at=self.now,
-            **translate.decision(decision, member.trial),
+            **translate.decision(decision, member.trial, decision.at - self.world.began),
         )
         self._soon(self._act, self._action(member))
         self._soon(self._hear_decision, made)

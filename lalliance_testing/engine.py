@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from lalliance_agents.faults import Fault
-from lalliance_testing.happenings import Happened
+from mission_control.watch.happened import Happened
 
 
 class Engine(Protocol):

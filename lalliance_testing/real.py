@@ -18,13 +18,14 @@ from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
 from lalliance_agents.faults import Fault
-from lalliance_agents.wire.messages import DecisionMade, Event, Message, Status
-from lalliance_testing.happenings import Happened, of_decision, of_event
+from lalliance_agents.wire.messages import Message
 from mission_control.chaos_client import ask
 from mission_control.keeper import LaunchError
 from mission_control.launch import Launcher, Plan
-from mission_control.picture import printable
 from mission_control.temporary import own_folder
+from mission_control.watch.happened import Happened
+from mission_control.watch.story import Story
+from mission_control.watch.words import printable
 from world_server.world import TRIAL_PAUSE
 
 #: Real seconds that the start of all processes may take at most, and all that is not mission time at the mission's end.
@@ -41,35 +42,28 @@ class Recorder:
     """A launcher's view that writes down what happens.
 
     Args:
+        mission: the mission's name.
         note: called with each event.
     """
 
-    def __init__(self, note: Callable[[Happened], None]) -> None:
+    def __init__(self, mission: str, note: Callable[[Happened], None]) -> None:
         self._note = note
-        self._elapsed = 0.0
-        #: How far the time since the trial began is ahead of the launcher's own, in seconds.
-        self._lead = 0.0
+        self._story = Story(mission)
+        self._now = 0.0
 
     def take(self, message: Message, now: float) -> None:
         """A message of the mission came at `now`."""
-        match message:
-            case Status():
-                self._lead = message.elapsed - now
-                self._elapsed = message.elapsed
-            case DecisionMade():
-                self._note(of_decision(message, now + self._lead))
-            case Event() if (event := of_event(message)) is not None:
-                self._elapsed = event.at
-                self._note(event)
-            case _:
-                pass
+        self._now = now
+        happened = self._story.hear(message, now)
+        if happened is not None:
+            self._note(happened)
 
     def locate(self, mission: str, endpoint: str) -> None:
         """Where the bus is, is known."""
 
     def say(self, text: str) -> None:
         """Something happened to a process, or it printed a line."""
-        self._note(Happened(self._elapsed, "remark", printable(text)))
+        self._note(Happened(self._story.elapsed(self._now), "remark", printable(text)))
 
 
 class Real:
@@ -119,7 +113,7 @@ class Real:
 
     async def _launch(self, plan: Plan) -> None:
         self._told_to_close = asyncio.Event()
-        self._launcher = Launcher(plan, Recorder(self._note))
+        self._launcher = Launcher(plan, Recorder(self._mission.name, self._note))
         self._launching = asyncio.create_task(self._launcher.run())
         self._loop = asyncio.get_running_loop()
         self._ready.set()

@@ -15,8 +15,9 @@ from lalliance_agents.faults import describe, kind_of
 from lalliance_agents.mission_file import read_fault
 from lalliance_testing.blame import ExpectationError, blames_its_caller
 from lalliance_testing.engine import Engine
-from lalliance_testing.happenings import Happened, Wanted
+from lalliance_testing.happenings import Wanted
 from lalliance_testing.judgement import broken, unfired
+from mission_control.watch.happened import Happened
 
 #: Mission seconds after which what a fault does is sure to have been told: robots report each second, in turn with the world.
 REPORTED = 2.5

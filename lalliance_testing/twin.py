@@ -12,7 +12,7 @@ from lalliance_agents.wire.messages import DecisionMade
 from lalliance_study.evidence import Witness, collect
 from lalliance_study.invariants import judge
 from lalliance_study.simulator import Simulator
-from lalliance_testing.happenings import Happened, of_decision, of_event
+from mission_control.watch.happened import Happened, happened_in
 from world_server.world import Happening
 
 
@@ -33,10 +33,7 @@ class Twin:
         return f"<Twin {self._simulator!r}>"
 
     def _take(self, told: Happening | DecisionMade) -> None:
-        if isinstance(told, DecisionMade):
-            self.events.append(of_decision(told, self._simulator.world.elapsed))
-        elif (event := of_event(told)) is not None:
-            self.events.append(event)
+        self.events += happened_in(told, self._simulator.world.elapsed)
 
     def start(self) -> None:
         """Let time pass until the first trial begins."""

@@ -108,6 +108,6 @@ def _ask(mission: "Mission", connect: str | None, keys: Path | None, **command: 
 
 
 def _tell(answer: "ChaosAnswer", *, as_json: bool) -> None:
-    from mission_control.picture import printable
+    from mission_control.watch.words import printable
 
     typer.echo(json.dumps(answer.model_dump(include={"done", "text", "faults"})) if as_json else printable(answer.text))

@@ -23,6 +23,7 @@ from mission_control.chaos import chaos
 from mission_control.deploy.compose_command import deploy
 from mission_control.deploy.keys_command import keys as keys_command
 from mission_control.keeping import tell
+from mission_control.record_command import bag, check_extra, new_recording, record, replay
 from mission_control.shell import (
     AsJson,
     JournalPath,
@@ -41,12 +42,14 @@ from mission_control.shell import (
 from mission_control.simulate import simulate
 from mission_control.single import health, robot, router, summary, world
 from mission_control.study_command import study
+from mission_control.watch_commands import echo, hz, top, why
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from lalliance_agents.config import Mission
     from mission_control.live import Lines
+    from mission_control.recording.writer import RecordingWriter
 
 #: A silence timeout shorter than this, in real seconds, is at the mercy of the machine's scheduling.
 SHORTEST_SILENCE = 0.15
@@ -88,6 +91,9 @@ def run(
     keys: Keys = None,
     learned: Learned = None,
     journal: JournalPath = None,
+    recorded: Annotated[
+        Path | None, typer.Option("--record", metavar="FILE", help="All that is said is recorded there.")
+    ] = None,
     plain: Annotated[bool, typer.Option("--plain", help="One line per event instead of the live view.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -98,6 +104,11 @@ def run(
     from mission_control.yardstick import with_optimum
     from world_server.history import recall
 
+    if recorded is not None:
+        check_extra()
+        from mission_control.recording.writer import check_new
+
+        check_new(recorded)
     if connect is not None and listen is not None:
         raise UserError("--connect uses a router that runs already, --listen starts one; expected one of the two")
     mission = load_part(path, seed, part="team")
@@ -123,9 +134,9 @@ def run(
 
     async def launch(kept: Path) -> dict[str, Any]:
         with _view(mission, console, plain=plain) as view:
-            return await Launcher(plan(kept), view).run()
+            return await Launcher(plan(kept), view, writer).run()
 
-    with _kept(journal) as kept:
+    with _kept(journal) as kept, _recorded(recorded, path, mission) as writer:
         outcome = run_until_told(launch(kept))
     tell(with_optimum(outcome, mission), as_json=as_json, console=console)
 
@@ -137,6 +148,12 @@ app.command()(world)
 app.command()(robot)
 app.command()(health)
 app.command()(summary)
+app.command()(why)
+app.command()(echo)
+app.command()(hz)
+app.command()(top)
+app.command()(record)
+app.command()(replay)
 
 
 @app.command()
@@ -167,6 +184,7 @@ def schema() -> None:
 
 
 app.add_typer(chaos, name="chaos")
+app.add_typer(bag, name="bag")
 app.add_typer(keys_command, name="keys")
 app.add_typer(deploy, name="deploy")
 app.add_typer(study, name="study")
@@ -190,10 +208,26 @@ def _kept(journal: Path | None) -> Iterator[Path]:
         yield folder / "journal"
 
 
+@contextlib.contextmanager
+def _recorded(recorded: Path | None, path: Path, mission: "Mission") -> "Iterator[RecordingWriter | None]":
+    """The recording, if there is to be one; that it cannot be ended as it should is no fault of the mission."""
+    if recorded is None:
+        yield None
+        return
+    from mission_control.recording.writer import RecordingError
+
+    writer = new_recording(recorded, path, mission)
+    try:
+        with writer:
+            yield writer
+    except RecordingError as error:
+        warn(str(error))
+
+
 def _view(mission: "Mission", console: "Console", *, plain: bool) -> "Lines":
     from mission_control.live import Lines, LiveView
 
-    return LiveView(mission, console) if console.is_terminal and not plain else Lines(console)
+    return LiveView(mission, console) if console.is_terminal and not plain else Lines(mission.name, console)
 
 
 def _fail(text: str, status: int) -> NoReturn:

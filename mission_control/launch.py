@@ -8,12 +8,13 @@ another alone.
 import asyncio
 import contextlib
 import signal
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from lalliance_agents.bus.base import Bus
-from lalliance_agents.bus.credentials import credentials_in
+from lalliance_agents.bus.credentials import Credentials, credentials_in
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.bus.zenoh_bus import open_bus
@@ -28,6 +29,9 @@ from mission_control.processes import GRACE, Child
 from mission_control.running import announced
 from world_server.history import recall
 from world_server.world import Stage, World
+
+if TYPE_CHECKING:
+    from mission_control.recording.writer import RecordingWriter
 
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
@@ -144,11 +148,13 @@ class Launcher:
     Args:
         plan: what to launch.
         view: where to show what happens.
+        writer: the recording of all that is said, if there is to be one.
     """
 
-    def __init__(self, plan: Plan, view: View) -> None:
+    def __init__(self, plan: Plan, view: View, writer: "RecordingWriter | None" = None) -> None:
         self._plan = plan
         self._view = view
+        self._writer = writer
         self._clock = MissionClock(plan.speed)
         self._endpoint = plan.endpoint()
         self._router: Child | None = None
@@ -177,7 +183,7 @@ class Launcher:
             name = self._plan.mission.name
             keys = self._plan.keys
             shown = None if keys is None else credentials_in(keys, OPERATOR)
-            async with await open_bus(self._endpoint, credentials=shown) as bus:
+            async with self._recording(shown), await open_bus(self._endpoint, credentials=shown) as bus:
                 with announced(name, self._endpoint):
                     self._view.locate(name, self._endpoint)
                     return await self._conduct(bus)
@@ -191,6 +197,26 @@ class Launcher:
             return False
         child.send_signal(signal.SIGKILL)
         return True
+
+    @contextlib.asynccontextmanager
+    async def _recording(self, shown: Credentials | None) -> AsyncIterator[None]:
+        """Have everything recorded, from before anybody is there until after all have gone."""
+        if self._writer is None:
+            yield
+            return
+        from mission_control.recording.recorder import recording, told  # noqa: PLC0415 - needs an extra
+
+        recorded = recording(
+            self._writer,
+            self._plan.mission,
+            self._endpoint,
+            credentials=shown,
+            clock=self._clock,
+            say=self._view.say,
+        )
+        async with recorded:
+            yield
+        self._view.say(told(self._writer))
 
     async def _conduct(self, bus: Bus) -> dict[str, Any]:
         messenger = await self._watch(bus)

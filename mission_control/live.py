@@ -1,5 +1,6 @@
 """The live view: who is on what, how motivated, how far. Where there is no terminal, one line per event."""
 
+from collections import deque
 from collections.abc import Callable
 from types import TracebackType
 from typing import Self
@@ -11,7 +12,8 @@ from rich.text import Text
 
 from lalliance_agents.config import Mission
 from lalliance_agents.wire.messages import Message
-from mission_control.picture import Picture, printable
+from mission_control.watch.story import Story
+from mission_control.watch.words import printable
 
 _BAR = 16
 
@@ -26,12 +28,13 @@ class Lines:
     """A view for where there is no terminal: each event as a line.
 
     Args:
+        mission: the mission's name.
         console: where to write.
     """
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, mission: str, console: Console) -> None:
         self._console = console
-        self._picture = Picture()
+        self._story = Story(mission)
 
     def __enter__(self) -> Self:
         return self
@@ -43,9 +46,9 @@ class Lines:
 
     def take(self, message: Message, now: float) -> None:
         """Show a message of the mission that came at `now`."""
-        line = self._picture.take(message, now)
-        if line is not None:
-            self.say(line)
+        happened = self._story.hear(message, now)
+        if happened is not None:
+            self.say(str(happened))
 
     def locate(self, mission: str, endpoint: str) -> None:
         """Show where the mission's bus is."""
@@ -69,8 +72,9 @@ class LiveView(Lines):
     """
 
     def __init__(self, mission: Mission, console: Console) -> None:
-        super().__init__(console)
+        super().__init__(mission.name, console)
         self._mission = mission
+        self._said: deque[str] = deque(maxlen=RETOLD)
         self._name_width = max(map(len, [*mission.robots, *mission.tasks]))
         self._endpoint = ""
         self._live = Live(console=console, get_renderable=self._render, refresh_per_second=5, screen=True)
@@ -83,12 +87,12 @@ class LiveView(Lines):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._live.__exit__(kind, error, trace)
-        for line in list(self._picture.events)[-RETOLD:]:
+        for line in self._said:
             super().say(line)
 
     def take(self, message: Message, now: float) -> None:
-        """Put a message into the picture; it shows at the next redraw."""
-        self._picture.take(message, now)
+        """Go on with the story; it shows at the next redraw."""
+        super().take(message, now)
 
     def locate(self, mission: str, endpoint: str) -> None:
         """Show where the mission's bus is, for as long as the view lasts."""
@@ -97,20 +101,20 @@ class LiveView(Lines):
 
     def say(self, text: str) -> None:
         """Show a remark among the events."""
-        self._picture.events.append(printable(text))
+        self._said.append(printable(text))
 
     def _render(self) -> RenderableType:
         height = self._console.size.height
         parts: list[Callable[[int], RenderableType]] = [self._headline, self._robots, self._tasks]
         rows = [1, min(len(self._mission.robots), height // 3) + 2, min(len(self._mission.tasks), height // 3) + 2]
-        if self._picture.faults:
+        if self._story.faults:
             parts.insert(1, self._faults)
             rows.insert(1, 1)
         left = max(height - sum(rows) - 2, 3)
         return Group(*(part(row) for part, row in zip(parts, rows, strict=True)), self._events(left))
 
     def _headline(self, _: int) -> Text:
-        status = self._picture.status
+        status = self._story.status
         if status is None:
             line = Text(f"{self._mission.name}: starting {len(self._mission.robots)} robots …", style="bold")
         else:
@@ -120,7 +124,10 @@ class LiveView(Lines):
 
     def _faults(self, _: int) -> Text:
         return Text(
-            f"in force: {'; '.join(map(printable, self._picture.faults))}", "red", no_wrap=True, overflow="ellipsis"
+            f"in force: {'; '.join(map(printable, list(self._story.faults.values())))}",
+            "red",
+            no_wrap=True,
+            overflow="ellipsis",
         )
 
     def _robots(self, rows: int) -> Table:
@@ -130,7 +137,7 @@ class LiveView(Lines):
         table.add_column("on", no_wrap=True, min_width=max(widest, len("not there")))
         table.add_column("most motivated for", no_wrap=True, min_width=widest + len(" (waiting)"))
         table.add_column("motivation", no_wrap=True)
-        status = self._picture.status
+        status = self._story.status
         facts = status.robots if status else {}
         for robot in list(self._mission.robots)[: rows - 2]:
             fact = facts.get(robot, {})
@@ -144,7 +151,8 @@ class LiveView(Lines):
         return table
 
     def _wish(self, robot: str) -> tuple[str, str]:
-        strongest = self._picture.strongest(robot)
+        seen = self._story.robots.get(robot)
+        strongest = None if seen is None else seen.strongest
         if strongest is None:
             return "", ""
         task, factors = strongest
@@ -161,7 +169,7 @@ class LiveView(Lines):
         table.add_column("progress", no_wrap=True)
         table.add_column("", no_wrap=True, min_width=len("not yet"))
         table.add_column("robots", no_wrap=True)
-        status = self._picture.status
+        status = self._story.status
         facts = status.tasks if status else {}
         open_first = sorted(self._mission.tasks, key=lambda task: bool(facts.get(task, {}).get("complete")))
         for task in open_first[: rows - 2]:
@@ -170,11 +178,13 @@ class LiveView(Lines):
             share = float(progress) if isinstance(progress, int | float) else 0.0
             state = "done" if fact.get("complete") else ("" if fact.get("applicable") else "not yet")
             style = "dim" if state else ""
-            table.add_row(
-                Text(task, style=style), bar(share), Text(state, style=style), ", ".join(self._picture.working(task))
-            )
+            table.add_row(Text(task, style=style), bar(share), Text(state, style=style), ", ".join(self._working(task)))
         return table
 
+    def _working(self, task: str) -> list[str]:
+        """The robots whose bodies work on `task`."""
+        robots = self._story.status.robots if self._story.status else {}
+        return [robot for robot, facts in robots.items() if facts.get("task") == task and facts.get("present")]
+
     def _events(self, rows: int) -> Text:
-        lines = [printable(line) for line in list(self._picture.events)[-rows:]]
-        return Text("\n".join(lines), style="dim", no_wrap=True, overflow="ellipsis")
+        return Text("\n".join(list(self._said)[-rows:]), style="dim", no_wrap=True, overflow="ellipsis")

@@ -39,13 +39,18 @@ def announced(mission: str, endpoint: str) -> Iterator[None]:
 
 def endpoints(mission: str) -> list[str]:
     """Where the missions of this name run that were started here."""
+    return [endpoint for name, endpoint in running() if name == mission]
+
+
+def running() -> list[tuple[str, str]]:
+    """The missions that were started here and run, each with the endpoint of its bus."""
     try:
         folder = _folder()
-        files = [] if folder is None else sorted(folder.glob(f"{mission}.*"))
+        files = [] if folder is None else sorted(folder.glob("[!.]*.*"))
     except OSError:
         return []
-    found = (_endpoint(path) for path in files)
-    return [endpoint for endpoint in found if endpoint is not None]
+    found = ((path.name.rpartition(".")[0], _endpoint(path)) for path in files)
+    return [(mission, endpoint) for mission, endpoint in found if endpoint is not None]
 
 
 def _endpoint(path: Path) -> str | None:

@@ -27,6 +27,7 @@ def simulate(
         int | None, typer.Option(min=1, max=1024, help="Processes for many runs; default: one per core.")
     ] = None,
     events: Annotated[bool, typer.Option("--events", help="Print every event of the run.")] = False,
+    why: Annotated[bool, typer.Option("--why", help="Tell what happened and why, a sentence each.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a mission in virtual time: the same seed gives the same run, to the byte."""
@@ -34,34 +35,44 @@ def simulate(
 
     from mission_control.missions import load
 
-    if events and runs > 1:
-        raise UserError(f"--events shows one run; expected --runs 1, not {runs}")
+    if (events or why) and runs > 1:
+        raise UserError(f"--{'events' if events else 'why'} shows one run; expected --runs 1, not {runs}")
     mission = load(path, for_team=False)
     if seed is not None:
         mission = mission.model_copy(update={"seed": seed})
     warn_of(path, mission)
     console = Console(stderr=as_json)
     found = (
-        _once(mission, console, events=events, as_json=as_json) if runs == 1 else _often(mission, runs, jobs, console)
+        _once(mission, console, events=events, why=why, as_json=as_json)
+        if runs == 1
+        else _often(mission, runs, jobs, console)
     )
     if as_json:
         typer.echo(json.dumps(found))
     raise typer.Exit(0 if found["complete"] else 1)
 
 
-def _once(mission: "Mission", console: "Console", *, events: bool, as_json: bool) -> Mapping[str, Any]:
+def _once(mission: "Mission", console: "Console", *, events: bool, why: bool, as_json: bool) -> Mapping[str, Any]:
     from lalliance_study.simulator import Simulator
     from mission_control.summary import show
+    from mission_control.watch.explain import plain, tell
+    from mission_control.watch.happened import Happened, happened_in
     from mission_control.yardstick import with_optimum
 
     simulator = Simulator(mission)
+    told: list[Happened] = []
+    if why:
+        simulator.follow(lambda one: told.extend(happened_in(one, simulator.world.elapsed)))
     with _progress(simulator):
         summary = with_optimum(simulator.run(), mission)
     if not as_json:
         for line in simulator.log if events else ():
             typer.echo(str(line))
+        for happened in told:
+            typer.echo(tell(happened))
         show(summary, console)
-    return {**summary, "events": [line._asdict() for line in simulator.log]} if events else summary
+    document = {**summary, "events": [line._asdict() for line in simulator.log]} if events else summary
+    return {**document, "happened": [plain(happened) for happened in told]} if why else document
 
 
 def _progress(simulator: "Simulator") -> AbstractContextManager[object]:

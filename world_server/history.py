@@ -11,6 +11,7 @@ becomes: the tests hold it against one that was never interrupted.
 """
 
 import math
+from collections import deque
 from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
@@ -30,6 +31,13 @@ from lalliance_agents.wire.messages import (
 )
 from world_server.journal import Entry, Journal
 from world_server.world import Happening, Stage, World
+
+#: Kept of what happened and of what was decided, for whoever looks on later: the latest.
+MOST_PAST = 2000
+#: Decisions kept of each robot at least, however many robots there are.
+LEAST_DECISIONS = 20
+#: Larger decisions are not kept, in bytes: whoever makes up large ones cannot fill the memory.
+LARGEST_DECISION = 32 * 1024
 
 
 class Input(StrEnum):
@@ -54,13 +62,20 @@ class History:
         journal: where to record; None: nowhere.
         tell: called with everything that happens from now on, as it happens.
 
+    Attributes:
+        past: what happened before this history began, according to the journal, and in which trial.
+        decisions: what each robot decided, packed, the latest last.
+
     Raises:
         UserError: the journal is damaged.
     """
 
     def __init__(self, mission: Mission, journal: Journal | None, tell: Callable[[Happening], None]) -> None:
         self._journal = journal
-        self._tell: Callable[[Happening], None] = lambda _: None
+        self.past: deque[tuple[int, Happening]] = deque(maxlen=MOST_PAST)
+        most = max(MOST_PAST // len(mission.robots), LEAST_DECISIONS)
+        self.decisions: dict[str, deque[bytes]] = {robot: deque(maxlen=most) for robot in mission.robots}
+        self._tell: Callable[[Happening], None] = lambda one: self.past.append((self.world.trial, one))
         self.world = World(mission, 0.0, self._pass_on)
         #: The latest instant at which anything went in, and the one until which the world has moved; in seconds.
         self.now = self.moved = 0.0
@@ -81,10 +96,41 @@ class History:
     def _replay(self, journal: Journal) -> None:
         for entry in journal.entries():
             try:
-                _put_in(self.world, entry)
+                self._put_in(entry)
             except (MessageError, UserError, ValueError) as error:
                 raise journal.damaged(entry.number) from error
             self.now = max(self.now, entry.at, entry.until or 0.0)
+
+    def _put_in(self, entry: Entry) -> None:
+        """Put an input of the journal into the world.
+
+        Raises:
+            MessageError, UserError, ValueError: there is no such input.
+        """
+        world, at, content = self.world, entry.at, entry.content
+        match Input(entry.kind):
+            case Input.ADVANCE:
+                world.advance(max(at, entry.until or -math.inf))
+            case Input.BEGIN:
+                world.begin(at)
+            case Input.PRESENCE:
+                word = content.decode()
+                world.presence(word[1:], word[:1] == _sign(True), at)
+            case Input.LAUNCHER:
+                world.launcher(content.decode() == _sign(True), at)
+            case Input.ACT:
+                action = decode(Action, content)
+                world.act(action, at)
+                if entry.until is not None:
+                    world.bodies.refresh(action.sender, entry.until)
+            case Input.DECIDED:
+                self._decided(decode(DecisionMade, content), at)
+            case Input.REPORTED:
+                world.reported(decode(LinkReport, content), at)
+            case Input.DONE:
+                world.done(decode(DeedDone, content).number, at)
+            case Input.COMMAND:
+                _obey(world, decode(ChaosCommand, content), at)
 
     def _record(self, kind: Input, now: float, content: Message | str = "") -> int:
         """Take an input down, which the world has taken; the number of its entry."""
@@ -161,8 +207,13 @@ class History:
 
     def decided(self, made: DecisionMade, now: float) -> None:
         """A robot reports a decision."""
-        self.world.decided(made, now)
+        self._decided(made, now)
         self._record(Input.DECIDED, now, made)
+
+    def _decided(self, made: DecisionMade, now: float) -> None:
+        self.world.decided(made, now)
+        if made.sender in self.decisions and len(packed := encode(made)) <= LARGEST_DECISION:
+            self.decisions[made.sender].append(packed)
 
     def reported(self, report: LinkReport, now: float) -> None:
         """A robot reports its counters."""
@@ -227,35 +278,3 @@ def _obey(world: World, command: ChaosCommand, now: float) -> str:
     if command.verb == "heal":
         return world.heal(command.name, now)
     return world.inject(read_fault(command.fault), command.lasts, now)
-
-
-def _put_in(world: World, entry: Entry) -> None:
-    """Put an input of the journal into the world.
-
-    Raises:
-        MessageError, UserError, ValueError: there is no such input.
-    """
-    at, content = entry.at, entry.content
-    match Input(entry.kind):
-        case Input.ADVANCE:
-            world.advance(max(at, entry.until or -math.inf))
-        case Input.BEGIN:
-            world.begin(at)
-        case Input.PRESENCE:
-            word = content.decode()
-            world.presence(word[1:], word[:1] == _sign(True), at)
-        case Input.LAUNCHER:
-            world.launcher(content.decode() == _sign(True), at)
-        case Input.ACT:
-            action = decode(Action, content)
-            world.act(action, at)
-            if entry.until is not None:
-                world.bodies.refresh(action.sender, entry.until)
-        case Input.DECIDED:
-            world.decided(decode(DecisionMade, content), at)
-        case Input.REPORTED:
-            world.reported(decode(LinkReport, content), at)
-        case Input.DONE:
-            world.done(decode(DeedDone, content).number, at)
-        case Input.COMMAND:
-            _obey(world, decode(ChaosCommand, content), at)

@@ -11,6 +11,7 @@ still meanwhile. Nothing is told, to robots or to operators, before the journal 
 import asyncio
 import contextlib
 import logging
+from collections import deque
 from typing import Any
 
 from lalliance_agents.bus.base import Bus, Registration, Sample
@@ -24,7 +25,7 @@ from lalliance_agents.wire.messages import LONGEST_LINE, Action, DecisionMade, D
 from world_server.chaos import ChaosDesk
 from world_server.environments.base import TaskView
 from world_server.failures import Order
-from world_server.history import History
+from world_server.history import MOST_PAST, History
 from world_server.journal import Journal
 from world_server.world import REFRESH_PERIOD, STEP, Happening
 
@@ -78,6 +79,7 @@ class WorldServer:
         self._history = History(mission, journal, self._tell)
         self._world = self._history.world
         self._untold: list[tuple[int, Happening]] = []
+        self._events: deque[Sample] = deque(maxlen=MOST_PAST)
         self._awaited = set(self._world.bodies.there())
         if self._world.has_launcher:
             self._awaited.add(LAUNCHER)
@@ -86,6 +88,8 @@ class WorldServer:
             incarnation = journal.next_incarnation(incarnation)
         self._messenger = Messenger(bus, self._keys, WORLD, incarnation, self._now, mission.robots)
         self._world.ledger.dropped_here = self._messenger.dropped_of
+        for trial, one in self._history.past:
+            self._events.append(self._messenger.sample(Kind.EVENT, **_telling(one, trial)))
         self._desk = ChaosDesk(self._history, self._messenger, self._now, self._settle)
         self._told_rules: dict[str, Any] = {}
         self._published: dict[str, tuple[int, TaskView]] = {}
@@ -129,6 +133,8 @@ class WorldServer:
         await messenger.offer(keys.build(Kind.SENSE_TASK), self._answer_tasks)
         await messenger.offer(keys.build(Kind.SENSE_ROBOT), self._answer_bodies)
         await messenger.offer(keys.build(Kind.CHAOS_RULES), self._answer_rules)
+        await messenger.offer(keys.build(Kind.EVENT), lambda _: list(self._events))
+        await messenger.offer(keys.build(Kind.DECISION), self._answer_decisions)
         for kind in (Kind.ACTION, Kind.DECISION, Kind.LINK, Kind.CHAOS_DEED):
             await messenger.listen(keys.build(kind), self._receive)
 
@@ -208,24 +214,18 @@ class WorldServer:
         untold, self._untold = self._untold, []
         for trial, one in untold:
             _log.info("%7.1f s  %s", one.elapsed, one.text)
-            details = dict(one.details)
-            self._send_event(
-                one.kind, one.text, one.elapsed, trial=trial, robot=one.robot, task=one.task, details=details
-            )
+            self._events.append(self._messenger.send(Kind.EVENT, **_telling(one, trial)))
         if self._rules() != self._told_rules:
             self._publish_rules()
-
-    def _send_event(self, kind: str, text: str, elapsed: float, **fields: Any) -> None:
-        self._messenger.send(Kind.EVENT, kind=kind, text=text[:LONGEST_LINE], elapsed=max(elapsed, 0.0), **fields)
 
     def _order(self, order: Order, now: float) -> None:
         """Ask whoever holds the processes; again each second, until it is seen to be done."""
         if now - self._ordered.get(order.number, -REFRESH_PERIOD) >= REFRESH_PERIOD:
             self._ordered[order.number] = now
             text = f"{order.deed} {order.robot}: {order.because}"
-            details = {"deed": order.deed.value, "number": order.number}
-            trial = self._world.trial
-            self._send_event("order", text, self._world.elapsed, trial=trial, robot=order.robot, details=details)
+            deed = {"deed": order.deed.value, "number": order.number}
+            one = Happening("order", text, self._world.elapsed, order.robot, details=deed)
+            self._messenger.send(Kind.EVENT, **_telling(one, self._world.trial))
 
     def _publish(self, now: float) -> None:
         self._settle()
@@ -292,7 +292,9 @@ class WorldServer:
         }
 
     def _body_fields(self) -> dict[str, Any]:
-        return {"mission": self._world.stage.value, "trial": self._world.trial, "learning": self._world.learning}
+        world = self._world
+        elapsed = max(self._now() - world.began, 0.0) if world.trial else 0.0
+        return {"mission": world.stage.value, "trial": world.trial, "learning": world.learning, "elapsed": elapsed}
 
     def _answer_rules(self, _: str) -> list[Sample]:
         self._settle()
@@ -319,6 +321,28 @@ class WorldServer:
             for key in keys
             if matches(query, key)
         ]
+
+    def _answer_decisions(self, query: str) -> list[Sample]:
+        """What robots decided, in their own messages: also of those that cannot answer any more."""
+        return [
+            Sample(key, made)
+            for robot, past in self._history.decisions.items()
+            if matches(query, key := self._keys.build(Kind.DECISION, robot=robot))
+            for made in past
+        ]
+
+
+def _telling(one: Happening, trial: int) -> dict[str, Any]:
+    """The fields of the message that tells what happened."""
+    return {
+        "kind": one.kind,
+        "text": one.text[:LONGEST_LINE],
+        "elapsed": max(one.elapsed, 0.0),
+        "trial": trial,
+        "robot": one.robot,
+        "task": one.task,
+        "details": dict(one.details),
+    }
 
 
 def _share(progress: float) -> float:

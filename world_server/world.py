@@ -47,9 +47,9 @@ class Happening:
     elapsed: float
     robot: str | None = None
     task: str | None = None
-    details: Mapping[str, str | bool] = field(default_factory=dict)
+    details: Mapping[str, str | int | bool] = field(default_factory=dict)
     """What the text says, for programs: of a takeover `from` and `cause`; of a fault its `name` and whether it `begins`; of
-    a trial whether it `begins`."""
+    a trial whether it `begins`; of an order its `deed` and `number`."""
 
 
 class World:

@@ -24,7 +24,7 @@ from lalliance_agents.bus.messenger import Messenger, Receiver
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import MissionError
-from lalliance_agents.model.events import Activate, Announce, BodyFailed, Command, Deactivate, TrialStarted
+from lalliance_agents.model.events import Activate, Announce, BodyFailed, Command, Deactivate, Decision, TrialStarted
 from lalliance_agents.model.parameters import Erratum
 from lalliance_agents.wire.keys import Key, Keys, Kind
 from lalliance_agents.wire.messages import Activity, BodyState, Heartbeat, Hello, Message, TaskState
@@ -101,6 +101,8 @@ class Robot:
         self._performer = Performer(self._body_failed, self._body_returned)
         self._motivations: Publication | None = None
         self._trial = 0 if world else 1
+        #: When the trial began, as far as the world has told; None: nobody tells.
+        self._trial_began: float | None = None
         self._told: dict[str, tuple[bool, bool]] = {}
         self._broken: set[str] = set()
         self._contradicted: set[str] = set()
@@ -208,6 +210,8 @@ class Robot:
             self._over.set_result("complete" if message.mission == "complete" else "failed")
         elif message.mission == "running":
             self._enter_trial(message.trial, message.learning)
+            if message.elapsed is not None and message.trial == self._trial:
+                self._trial_began = self._clock.now() - message.elapsed
 
     def _receive_hello(self, _: Key, message: Message) -> None:
         if not isinstance(message, Hello):
@@ -233,6 +237,7 @@ class Robot:
         if self._trial == 0:
             self._reports.begin()
         self._trial = trial
+        self._trial_began = self._clock.now()
         self._performer.stop_all()
         self._told.clear()
         for one in self._repertoire.values():
@@ -299,12 +304,16 @@ class Robot:
                 self._messenger.send(kind, key_task=command.task or "", **fields)
             case Activate():
                 self._performer.start(self._repertoire[command.decision.task])
-                self._act()
-                self._messenger.send(Kind.DECISION, **translate.decision(command.decision, self._trial))
+                self._tell_of(command.decision)
             case Deactivate():
                 self._performer.stop(command.decision.task)
-                self._act()
-                self._messenger.send(Kind.DECISION, **translate.decision(command.decision, self._trial))
+                self._tell_of(command.decision)
+
+    def _tell_of(self, decision: Decision) -> None:
+        """What follows from a decision for the body, and the decision itself."""
+        self._act()
+        elapsed = None if self._trial_began is None else decision.at - self._trial_began
+        self._messenger.send(Kind.DECISION, **translate.decision(decision, self._trial, elapsed))
 
     def _act(self) -> None:
         """Tell the world what the body works on."""

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from lalliance_agents.agent.behavior import TaskSense
-from lalliance_agents.model.events import Announce, Decision, Factors, Heard, Sensed, Teammate
+from lalliance_agents.model.events import Announce, Decision, Factors, Heard, Sensed, Teammate, Terms
 from lalliance_agents.model.parameters import Learning
 from lalliance_agents.wire.keys import Kind
 from lalliance_agents.wire.messages import LONGEST, Activity, Heartbeat, Scalars, TaskState
@@ -44,8 +44,8 @@ def announcement(command: Announce, trial: int) -> tuple[Kind, dict[str, Any]]:
     }
 
 
-def decision(made: Decision, trial: int) -> dict[str, Any]:
-    """The fields of the message that reports a decision."""
+def decision(made: Decision, trial: int, elapsed: float | None) -> dict[str, Any]:
+    """The fields of the message that reports a decision, made `elapsed` seconds after the trial began, if that is known."""
     return {
         "verb": made.verb.value,
         "task": made.task,
@@ -53,8 +53,12 @@ def decision(made: Decision, trial: int) -> dict[str, Any]:
         "other": made.other,
         "active_for": _seconds(made.active_for),
         "trial": trial,
+        "elapsed": None if elapsed is None else _seconds(elapsed),
+        "grown_for": _seconds(made.grown_for),
+        "expected": _seconds(made.expected),
         "factors": scalars(made.factors),
         "teammates": [scalars(mate) for mate in made.teammates],
+        "terms": scalars(made.terms),
     }
 
 
@@ -63,7 +67,7 @@ def _seconds(length: float) -> float:
     return max(0.0, length) if length <= LONGEST else LONGEST
 
 
-def scalars(record: Factors | Teammate) -> Scalars:
+def scalars(record: Factors | Teammate | Terms) -> Scalars:
     """A record's fields as plain values; a number that is not finite becomes None."""
     return {name.rstrip("_"): _plain(value) for name, value in record._asdict().items()}
 

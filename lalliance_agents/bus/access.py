@@ -19,8 +19,10 @@ _ANY_MISSION = Keys("*")
 _EVERYTHING = [f"{ROOT}/**", f"{ROOT}/*/@chaos/**"]
 #: Presences of processes: nothing is published there.
 _PRESENCES = (Kind.ALIVE, Kind.LAUNCHER)
-#: Last values, which their owners also answer queries with.
-_ANSWERED = (Kind.HELLO, Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.CHAOS_RULES)
+#: Last values and past events, which their owners also answer queries with.
+_ANSWERED = (Kind.HELLO, Kind.SENSE_TASK, Kind.SENSE_ROBOT, Kind.CHAOS_RULES, Kind.EVENT)
+#: What the world remembers for others, in their own messages.
+_REMEMBERED = (Kind.DECISION,)
 #: An operator who launches a mission also holds its processes.
 _OF_OPERATOR = (Kind.CHAOS_DEED, Kind.LAUNCHER)
 
@@ -32,7 +34,11 @@ def access_control(robots: Iterable[str]) -> dict[str, Any]:
         robots: the names of all its robots.
     """
     own = {name: list(_speaking(name, OF_ROBOT)) for name in robots}
-    own[WORLD] = [*_speaking(WORLD, OF_WORLD), _answer(f"{WORLD} carries out", [Kind.CHAOS_COMMAND])]
+    own[WORLD] = [
+        *_speaking(WORLD, OF_WORLD),
+        _answer(f"{WORLD} remembers", _REMEMBERED),
+        _answer(f"{WORLD} carries out", [Kind.CHAOS_COMMAND]),
+    ]
     own[OPERATOR] = [
         *_speaking(OPERATOR, _OF_OPERATOR),
         _rule(f"{OPERATOR} commands", ["query"], _keys([Kind.CHAOS_COMMAND])),
@@ -74,7 +80,7 @@ def _answer(name: str, kinds: Iterable[Kind], robot: str = "*") -> Rule:
 
 def _listening() -> Iterator[Rule]:
     yield _rule("everybody listens", _HEARD, _EVERYTHING)
-    yield _rule("everybody asks", ["query"], _keys(_ANSWERED))
+    yield _rule("everybody asks", ["query"], _keys((*_ANSWERED, *_REMEMBERED)))
 
 
 def _egress() -> Rule:

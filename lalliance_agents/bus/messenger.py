@@ -86,8 +86,13 @@ class Messenger:
         seq = next(self._presence_numbers if presence else self._other_numbers)
         return {"sender": self.me, "incarnation": self.incarnation, "seq": seq, "at": self._clock()}
 
-    def send(self, kind: Kind, /, *, key_task: str = "", key_robot: str = "", **fields: Any) -> None:
-        """Publish a message of `kind` under this participant's own name.
+    def sample(self, kind: Kind, /, *, key_task: str = "", key_robot: str = "", **fields: Any) -> Sample:
+        """A message of `kind` and its key, as `send` publishes it."""
+        key = self.keys.build(kind, robot=key_robot or self.me, task=key_task)
+        return Sample(key, self.compose(kind, **fields))
+
+    def send(self, kind: Kind, /, *, key_task: str = "", key_robot: str = "", **fields: Any) -> Sample:
+        """Publish a message of `kind` under this participant's own name, and return it.
 
         Args:
             kind: what it is.
@@ -95,9 +100,10 @@ class Messenger:
             key_robot: the robot in the key, if not this participant itself.
             fields: the message's fields, but for the header.
         """
-        key = self.keys.build(kind, robot=key_robot or self.me, task=key_task)
-        self.bus.put(key, self.compose(kind, **fields), _DELIVERY.get(kind, Delivery.STATE))
+        sample = self.sample(kind, key_task=key_task, key_robot=key_robot, **fields)
+        self.bus.put(sample.key, sample.payload, _DELIVERY.get(kind, Delivery.STATE))
         self.sent += 1
+        return sample
 
     async def listen(self, pattern: str, receiver: Receiver) -> Registration:
         """Have `receiver` called with each fresh message whose key matches `pattern`."""

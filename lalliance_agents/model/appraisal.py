@@ -122,7 +122,7 @@ class Appraisal:
 
     def teammates(self, task: str, now: float) -> tuple[Teammate, ...]:
         """What is known of all who were heard on `task`, the last one heard first."""
-        own_time = self._knowledge.own_time(task)
+        own_time, silences = self._knowledge.own_time(task), self._hearing.silences(now)
         found = [
             Teammate(
                 robot=contact.robot,
@@ -132,6 +132,9 @@ class Appraisal:
                 present=self._hearing.is_present(contact.robot, now),
                 patience=self._patience(contact, task, own_time),
                 task_time=self._knowledge.time_of(contact.robot, task),
+                silent_for=silences[contact.robot],
+                started=contact.started,
+                expected=contact.expected,
             )
             for contact in self._hearing.contacts(task)
         ]

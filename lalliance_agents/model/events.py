@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
-from lalliance_agents.model.parameters import Learning
+from lalliance_agents.model.parameters import Learning, Parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +186,40 @@ class Teammate(NamedTuple):
     """phi_ij(k, t), in seconds."""
     task_time: float | None
     """task_time_i(k, j, t), in seconds; None if unknown."""
+    silent_for: float
+    """Since when it was not heard at all, in seconds."""
+    started: float
+    """When its latest attempt began, by its own account."""
+    expected: float
+    """The time that it announced to need, in seconds."""
+
+
+class Terms(NamedTuple):
+    """The parameters that decide what the factors lead to, so that a decision can be understood by itself."""
+
+    architecture: str
+    strategy: str
+    threshold: float
+    """theta."""
+    silence_timeout: float
+    """tau, in seconds."""
+    boredom_threshold: float
+    give_up_factor: float
+    collision_window: float
+    """In seconds."""
+
+    @classmethod
+    def of(cls, parameters: Parameters) -> "Terms":
+        """Those of a robot with `parameters`."""
+        return cls(
+            parameters.architecture.value,
+            parameters.strategy.name,
+            parameters.threshold,
+            parameters.silence_timeout,
+            parameters.boredom_threshold,
+            parameters.give_up_factor,
+            parameters.effective_collision_window,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,10 +233,15 @@ class Decision:
     factors: Factors
     teammates: tuple[Teammate, ...]
     """Those heard on the task in this trial, the last one heard first."""
+    terms: Terms
     active_for: float = 0.0
     """How long the set had been active, in seconds."""
     other: str | None = None
     """The teammate that the cause speaks of: taken over from, or yielded to."""
+    grown_for: float = 0.0
+    """Activate: how long the motivation has grown from 0, in seconds; 0 where it does not grow steadily."""
+    expected: float = 0.0
+    """The time that the robot announces to need for this attempt, in seconds."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,7 @@ from lalliance_agents.model.events import (
     Pace,
     RosterKnown,
     Sensed,
+    Terms,
     TrialStarted,
 )
 from lalliance_agents.model.hearing import Hearing
@@ -59,6 +60,7 @@ class Mind:
     ) -> None:
         self.me = me
         self.parameters = parameters
+        self._terms = Terms.of(parameters)
         self.knowledge = Knowledge(me, tasks, parameters)
         self.hearing = Hearing(
             parameters.silence_timeout,
@@ -329,7 +331,11 @@ class Mind:
         factors = one.factors
         assert factors is not None  # noqa: S101 - a set is appraised before anything is decided about it
         teammates = self._appraisal.teammates(one.task, now)
-        return Decision(now, cause.verb, one.task, cause, factors, teammates, one.active_for(now), other)
+        steadily = not one.active and factors.pace is not Pace.RANDOM
+        grown_for = now - one.rose_at if steadily else 0.0
+        expected = one.expected if one.active else self._appraisal.expected_time(one.task)
+        behind = factors, teammates, self._terms, one.active_for(now), other, grown_for, expected
+        return Decision(now, cause.verb, one.task, cause, *behind)
 
     def _activate(self, now: float) -> list[Command]:
         """Erratum 5: incumbent first, then the highest motivation, then the lowest task index."""

@@ -45,6 +45,8 @@ class Motivation:
     base: float = 0.0
     since: float = 0.0
     rate: float = 0.0
+    rose_at: float = 0.0
+    """The step from which on it has last grown from 0."""
     active_since: float | None = None
     expected: float = 0.0
     """The own time announced for the current attempt, in seconds (erratum 15)."""
@@ -63,6 +65,8 @@ class Motivation:
     def grow(self, rate: float, before: float) -> None:
         """Grow at `rate` from the step `before` on."""
         if rate != self.rate:
+            if self.base == self.rate == 0.0:
+                self.rose_at = before
             self.base, self.since, self.rate = self.value(before), before, rate
 
     def hold(self, value: float, now: float) -> None:

@@ -8,7 +8,7 @@ Every key begins with `lalliance/<mission>/`. What follows:
     body/<robot>/action         robot -> world       what the body works on
     sense/task/<task>           world -> robots      state of a task
     sense/robot/<robot>         world -> that robot  state of its body and of the mission
-    mind/<robot>/decision       robot -> anybody     each decision with its factors
+    mind/<robot>/decision       robot -> anybody     each decision with its factors; the world remembers them
     mind/<robot>/motivation     robot -> anybody     all motivations and factors
     link/<robot>                robot -> anybody     what it received, and from whom
     world/event, world/status   world -> anybody     what happened; how the mission stands

@@ -102,6 +102,8 @@ class BodyState(Message):
     mission: Literal["waiting", "running", "complete", "failed"]
     trial: Count
     learning: Literal["active", "adaptive"]
+    elapsed: Seconds | None = None
+    """Time since the trial began, in seconds; informative."""
     failures: Annotated[list[str], FIRST_FAULT] = []
 
 
@@ -114,8 +116,16 @@ class DecisionMade(Message):
     other: Name | None
     active_for: Seconds
     trial: Count
+    elapsed: Seconds | None = None
+    """Time since the trial began, in seconds, as the world told the robot; None if nobody did."""
+    grown_for: Seconds = 0.0
+    """Activate: how long the motivation had grown from 0, in seconds; 0 where it does not grow steadily."""
+    expected: Seconds = 0.0
+    """The time that the robot announced to need, in seconds."""
     factors: Scalars
     teammates: Annotated[list[Scalars], FIRST_FAULT]
+    terms: Scalars = {}
+    """The parameters that decide what the factors lead to."""
 
 
 class Motivations(Message):

@@ -197,15 +197,19 @@ async def test_a_robot_answers_for_itself_and_not_for_the_world(join, eventually
     await robot.answer(f"{M}**", lambda _: [Sample(f"{M}sense/task/a", b"forged")])
     await world.answer(f"{M}sense/task/*", lambda _: [Sample(f"{M}sense/task/a", b"true")])
     await robot.answer(f"{M}hello/r1", lambda _: [Sample(f"{M}hello/r1", b"hello")])
+    for key in ("mind/r1/decision", "world/event"):
+        await robot.answer(M + key, lambda asked: [Sample(asked.key, b"forged")])
+        await world.answer(M + key, lambda asked: [Sample(asked.key, b"remembered")])
+    kinds = ("sense/task/*", "hello/*", "mind/r1/decision", "world/event")
 
     async def answers() -> set[bytes]:
-        return {one.payload for kind in ("sense/task/*", "hello/*") for one in await asker.query(M + kind, timeout=5.0)}
+        return {one.payload for kind in kinds for one in await asker.query(M + kind, timeout=5.0)}
 
-    async def both() -> bool:
-        return await answers() >= {b"true", b"hello"}
+    async def all_that_may() -> bool:
+        return await answers() >= {b"true", b"hello", b"remembered"}
 
-    await eventually(both)
-    assert await answers() == {b"true", b"hello"}
+    await eventually(all_that_may)
+    assert await answers() == {b"true", b"hello", b"remembered"}
 
 
 async def test_only_an_operator_commands(join, eventually) -> None:

@@ -1,29 +1,19 @@
 """What the README shows, done as it says."""
 
 import re
-import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import yaml
 from support.processes import MISSIONS, Processes, read_until
+from support.readme import README, blocks, commands
 
 from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.faults import LinkFault, kind_of
 from lalliance_agents.mission_file import parse_mission
 
 pytestmark = pytest.mark.alone
-
-README = (MISSIONS.parent / "README.md").read_text()
-
-
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.DOTALL | re.MULTILINE)
-
-
-def commands(block: str) -> list[list[str]]:
-    return [shlex.split(line)[1:] for line in block.splitlines() if line.startswith("lalliance ")]
 
 
 @pytest.fixture
@@ -40,7 +30,10 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
 TOGETHER = [block for block in blocks("console") if "lalliance router" in block]
 CHAOS = [block for block in blocks("console") if "lalliance chaos" in block]
 KEYS = [block for block in blocks("console") if "lalliance keys" in block]
-ALONE = [command for block in blocks("console") if block not in TOGETHER + CHAOS + KEYS for command in commands(block)]
+RECORDINGS = [block for block in blocks("console") if "lalliance bag" in block]  # see tests/system/test_recording.py
+WATCH = [block for block in blocks("console") if "lalliance why" in block]  # see tests/system/test_watching.py
+BESIDE = TOGETHER + CHAOS + KEYS + RECORDINGS + WATCH
+ALONE = [command for block in blocks("console") if block not in BESIDE for command in commands(block)]
 
 
 @pytest.mark.parametrize("command", ALONE, ids=" ".join)
@@ -113,5 +106,5 @@ def planned(mission: str, fault: str) -> str:
 
 def test_every_command_of_the_tool_is_in_the_readme(processes: Processes) -> None:
     listed = re.findall(r"^  (\w+)  ", processes.run("--help").stdout, flags=re.MULTILINE)
-    assert len(listed) == 14
+    assert len(listed) == 21
     assert [name for name in listed if f"lalliance {name}" not in README] == []

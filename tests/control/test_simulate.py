@@ -25,7 +25,7 @@ def test_one_run_gives_the_summary_of_a_real_one_and_its_events(processes: Proce
     document = processes.run_json("simulate", HANDLING, "--events")
     assert document["complete"]
     assert {"makespan", "tasks", "takeovers", "faults", "messages", "control", "seed"} <= document.keys()
-    assert [one["cause"] for one in document["takeovers"]] == ["silence", "impatience"]
+    assert [one["cause"] for one in document["takeovers"]] == ["silence"]
     assert [line["what"] for line in document["events"]].count("complete") == 16  # the task in the world, and its robot
 
 

@@ -16,15 +16,15 @@ from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.wire.keys import OPERATOR, Key, Keys, Kind
 from lalliance_agents.wire.messages import Message
-from mission_control.picture import Picture
+from mission_control.watch.story import Story
 
 
 async def look_on(mission: str) -> None:
-    keys, picture, heard = Keys(mission), Picture(), set[tuple[str, int]]()
+    keys, story, heard = Keys(mission), Story(mission), set[tuple[str, int]]()
 
     def tell(_: Key, message: Message) -> None:
-        if line := picture.take(message, time.monotonic()):
-            print(line, flush=True)
+        if happened := story.hear(message, time.monotonic()):
+            print(happened, flush=True)
 
     def hear(_: Key, message: Message) -> None:
         life = (message.sender, message.incarnation)

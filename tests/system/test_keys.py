@@ -17,6 +17,8 @@ from lalliance_agents.clock import MissionClock
 from lalliance_agents.errors import BusError
 from lalliance_agents.wire.keys import OPERATOR, WORLD, Keys, Kind
 from lalliance_agents.wire.messages import ChaosCommand, encode
+from mission_control.recording.reader import sightings
+from mission_control.watch.sighting import read
 
 pytestmark = pytest.mark.alone
 
@@ -37,7 +39,8 @@ async def test_a_mission_goes_on_while_others_meddle(processes: Processes, tmp_p
     (tmp_path / "team.yaml").write_text(TEAM)
     keys = new_keys(tmp_path / "keys", "r1", "r2", "r3")
     endpoint = free_endpoint("tls")
-    running = processes.start("run", "team.yaml", "--keys", keys, "--listen", endpoint, "--speed", "2", "--json")
+    command = ["run", "team.yaml", "--keys", keys, "--listen", endpoint, "--speed", "2", "--json", "--record", "a.mcap"]
+    running = processes.start(*command)
     await asyncio.to_thread(wait_for_start, running)
     async with await open_bus(endpoint, credentials=credentials_in(keys, "r1")) as robot:
         meddling = asyncio.create_task(meddle(robot))
@@ -54,6 +57,10 @@ async def test_a_mission_goes_on_while_others_meddle(processes: Processes, tmp_p
     assert "silence" not in {one["cause"] for one in summary["takeovers"]}
     assert summary["faults"] == []
     assert set(summary["messages"]["dropped"]) <= {"stale", "other trial"}
+    # An operator may record, and what was forged is not in it.
+    messages = [read(one, Keys("team"))[1] for one in sightings(tmp_path / "a.mcap")]
+    assert {message.sender for message in messages if message is not None} >= {"r1", "r2", "r3", WORLD}
+    assert 2**60 not in {message.incarnation for message in messages if message is not None}
 
 
 def wait_for_start(running) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from support.processes import MISSIONS, Processes
 
-from lalliance_testing.happenings import KINDS
+from mission_control.watch.happened import KINDS
 
 pytestmark = pytest.mark.alone
 

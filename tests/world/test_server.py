@@ -4,6 +4,7 @@ import asyncio
 import math
 import re
 from itertools import pairwise
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -20,6 +21,7 @@ from lalliance_agents.wire.messages import (
     BodyState,
     ChaosAnswer,
     ChaosCommand,
+    DecisionMade,
     Event,
     Message,
     Status,
@@ -29,6 +31,7 @@ from lalliance_agents.wire.messages import (
 )
 from world_server.environments.base import TaskView
 from world_server.environments.task_pool import TaskPool
+from world_server.journal import Journal
 from world_server.server import LINGER, WorldServer
 
 pytestmark = pytest.mark.virtual_time
@@ -110,6 +113,33 @@ async def test_who_comes_late_is_told_by_query_all_of_it_or_what_it_asks_for() -
         assert [key.robot for key, _ in await served.ask(Kind.SENSE_ROBOT, robot="left")] == ["left"]
         assert [key.robot for key, _ in await served.ask(Kind.SENSE_ROBOT)] == ["left", "right"]
         assert await served.ask(Kind.SENSE_ROBOT, robot="stranger") == []
+
+
+async def test_who_comes_late_is_told_what_happened_before_also_by_a_server_that_goes_on_from_the_journal(
+    tmp_path: Path,
+) -> None:
+    made = {"verb": "activate", "task": "a", "cause": "free", "other": None, "active_for": 0.0, "factors": {}}
+
+    async def past(served: Served) -> tuple[list[str], list[tuple[str, int, str]]]:
+        events = [m.text for _, m in await served.ask(Kind.EVENT) if isinstance(m, Event)]
+        decisions = [m for _, m in await served.ask(Kind.DECISION) if isinstance(m, DecisionMade)]
+        return events, [(m.sender, m.seq, m.task) for m in decisions]
+
+    mission = parse_mission(PAIR, "test.yaml")
+    begun = ["left is there", "right is there", "trial 1 begins (adaptive learning)"]
+    with Journal(tmp_path / "journal", mission) as journal:
+        async with Served(journal=journal) as served:
+            await served.appear("left", "right")
+            for robot in ("left", "right", "left", "stranger"):
+                served.voice(robot).send(Kind.DECISION, trial=1, teammates=[], **made)
+            await served.work("left", "a", 2)
+            first = await past(served)
+    assert first == (begun, [("left", 1, "a"), ("left", 2, "a"), ("right", 1, "a")])
+    with Journal(tmp_path / "journal", mission) as journal:
+        async with Served(journal=journal, returning=0.1) as served:
+            await asyncio.sleep(1)
+            events, decisions = await past(served)
+    assert (events[:3], decisions) == first
 
 
 async def test_what_robots_need_is_refreshed_every_second_and_changes_are_told_at_once() -> None:

@@ -1,0 +1,361 @@
+"""A mission as seen so far, put together from sightings, live or of a recording. Pure.
+
+A story takes one sighting after the other and believes the freshest message of each stream, as robots do. What it keeps of
+the past is limited, whatever comes: the latest of all that happened and of all attempts. Instants are seconds since the trial
+began, of the world's clock as far as it is known; only what is said to be of the onlooker's clock is of that.
+
+An attempt is one bar of a timeline: a robot on a task, from when to when. Decisions say when it begins and ends and why;
+where one was missed, what the robot announces tells that it is on a task, or idle, and its presence that it is not there.
+"""
+
+from collections import Counter, deque
+from dataclasses import dataclass, field
+
+from lalliance_agents.errors import MessageError
+from lalliance_agents.model.events import Verb
+from lalliance_agents.wire.freshness import Freshness
+from lalliance_agents.wire.keys import Key, Keys, Kind
+from lalliance_agents.wire.messages import (
+    Activity,
+    ChaosRules,
+    DecisionMade,
+    Event,
+    Heartbeat,
+    Hello,
+    LinkReport,
+    Message,
+    Motivations,
+    Scalars,
+    Status,
+    TaskState,
+)
+from mission_control.watch.happened import Happened, of_decision, of_event
+from mission_control.watch.sighting import Sighting, read
+
+#: Kept of what happened, and of attempts: the latest.
+MOST_HAPPENED = 20_000
+MOST_ATTEMPTS = 20_000
+#: Robots and tasks told apart: whoever makes up names cannot fill the memory.
+MOST_NAMES = 1024
+
+#: How an attempt ended that no decision ended: the robot's process ended, a new trial began, the mission ended.
+LOST = "lost"
+NEW_TRIAL = "new_trial"
+OVER = "over"
+
+
+@dataclass(slots=True)
+class Attempt:
+    """A robot on a task: one bar of a timeline."""
+
+    robot: str
+    task: str
+    trial: int
+    since: float
+    """In seconds since the trial began."""
+    began: str | None = None
+    """The cause of the decision; None where it was not seen."""
+    until: float | None = None
+    """In seconds since the trial began; None: it goes on."""
+    ended: str | None = None
+    """The cause of the decision, or `LOST`, `NEW_TRIAL` or `OVER`; None where it goes on or that was not seen."""
+
+
+@dataclass(slots=True)
+class RobotSeen:
+    """What was last seen of a robot."""
+
+    name: str
+    present: bool | None = None
+    """Whether its process is there; None: nobody has said so far."""
+    incarnation: int = 0
+    heard_at: float | None = None
+    """When its last message came, on the onlooker's clock, in seconds."""
+    tasks: tuple[str, ...] = ()
+    """What it says it can do."""
+    attempts: dict[str, Attempt] = field(default_factory=dict)
+    """Those that go on, by task: at most one, unless erratum 5 is read literally."""
+    last: Attempt | None = None
+    """The one that ended last."""
+    motivations: Motivations | None = None
+    threshold: float = 1.0
+    """What a motivation must reach, as far as a decision has said."""
+    link: LinkReport | None = None
+
+    @property
+    def task(self) -> str | None:
+        """The task it is on."""
+        return next(iter(self.attempts), None)
+
+    @property
+    def strongest(self) -> tuple[str, Scalars] | None:
+        """The task it is most motivated for, with the factors of that motivation."""
+        sets = self.motivations.sets if self.motivations is not None else {}
+        ranked = sorted(sets.items(), key=lambda item: -_number(item[1].get("motivation")))
+        return ranked[0] if ranked else None
+
+    @property
+    def hears(self) -> dict[str, bool]:
+        """Of each teammate that it ever heard: whether it hears it now."""
+        if self.link is None:
+            return {}
+        return {name: one.lost_for is None for name, one in self.link.teammates.items()}
+
+
+@dataclass(slots=True)
+class TaskSeen:
+    """What was last seen of a task."""
+
+    name: str
+    applicable: bool = False
+    complete: bool = False
+    progress: float = 0.0
+    """From 0 to 1."""
+    completed_at: float | None = None
+    """In seconds since the trial began."""
+
+
+class Story:
+    """A mission as seen so far.
+
+    Args:
+        mission: its name.
+
+    Attributes:
+        status: what the world last said of the mission.
+        rules: the link rules in force, as the world last said.
+        robots: by name, in the order in which they were first heard of.
+        tasks: the same.
+        happened: events and decisions, as they came.
+        attempts: in the order in which they began.
+        faults: those in force, by name, in words.
+        has_launcher: whether somebody is there who holds the robots' processes.
+        messages: how many came, by kind and by what became of them: `read`, `stale` (older than what came before),
+            `stranger` (of a robot too many), or why they could not be read.
+    """
+
+    def __init__(self, mission: str) -> None:
+        self.mission = mission
+        self.status: Status | None = None
+        self.rules: ChaosRules | None = None
+        self.robots: dict[str, RobotSeen] = {}
+        self.tasks: dict[str, TaskSeen] = {}
+        self.happened: deque[Happened] = deque(maxlen=MOST_HAPPENED)
+        self.attempts: deque[Attempt] = deque(maxlen=MOST_ATTEMPTS)
+        self.faults: dict[str, str] = {}
+        self.messages: Counter[tuple[str, str]] = Counter()
+        self.trial = 0
+        self.has_launcher = False
+        self._keys = Keys(mission)
+        self._freshness = Freshness()
+        self._lead = 0.0
+        self._latest = 0.0
+        self._has_world = False
+
+    def __repr__(self) -> str:
+        stage = self.status.mission if self.status else "not heard of"
+        return f"<Story of {self.mission}: {stage}, {len(self.robots)} robots, {len(self.happened)} happened>"
+
+    def elapsed(self, now: float) -> float:
+        """Time since the trial began, in seconds, at the instant `now` of the onlooker's clock."""
+        return max(now + self._lead, 0.0)
+
+    def takeovers(self) -> list[Happened]:
+        """Who took which task from whom and why, as the world told it."""
+        return [one for one in self.happened if one.kind == "takeover"]
+
+    def decisions(self, robot: str | None = None, task: str | None = None) -> list[Happened]:
+        """What the robots decided: all, or one of them, or about one task."""
+        return [
+            one
+            for one in self.happened
+            if one.made is not None and robot in {None, one.robot} and task in {None, one.task}
+        ]
+
+    def take(self, sighting: Sighting) -> Happened | None:
+        """Go on with one sighting; what happened by it, if anything."""
+        kind = "unknown"
+        try:
+            kind = self._keys.parse(sighting.key).kind.name.lower()
+            key, message = read(sighting, self._keys)
+        except MessageError as error:
+            self.messages[kind, error.reason] += 1
+            return None
+        if message is None:
+            return self._presence(key, not sighting.gone, sighting.now)
+        if self._freshness.overtaken(key.stream, message.incarnation, message.seq, sighting.now):
+            self.messages[kind, "stale"] += 1
+            return None
+        if key.robot is not None and self._robot(key.robot) is None:
+            self.messages[kind, "stranger"] += 1
+            return None
+        self.messages[kind, "read"] += 1
+        if isinstance(message, TaskState) and key.task is not None:
+            self._task_state(key.task, message)
+            return None
+        return self.hear(message, sighting.now)
+
+    def hear(self, message: Message, now: float) -> Happened | None:
+        """Go on with a checked, fresh message that came at `now` on the onlooker's clock; what happened by it."""
+        if message.sender in self.robots:
+            seen = self.robots[message.sender]
+            seen.heard_at, seen.incarnation = now, message.incarnation
+        match message:
+            case Status():
+                self._heard_status(message, now)
+            case ChaosRules():
+                self.rules = message
+            case Event():
+                return self._heard_event(of_event(message))
+            case DecisionMade():
+                return self._decided(message, now)
+            case _:
+                self._heard_robot(message, now)
+        return None
+
+    def _robot(self, name: str) -> RobotSeen | None:
+        if name not in self.robots and len(self.robots) < MOST_NAMES:
+            self.robots[name] = RobotSeen(name)
+        return self.robots.get(name)
+
+    def _task(self, name: str) -> TaskSeen | None:
+        if name not in self.tasks and len(self.tasks) < MOST_NAMES:
+            self.tasks[name] = TaskSeen(name)
+        return self.tasks.get(name)
+
+    def _presence(self, key: Key, present: bool, now: float) -> Happened | None:
+        if key.kind is Kind.LAUNCHER:
+            self.has_launcher = present
+        seen = self._robot(key.robot) if key.kind is Kind.ALIVE and key.robot is not None else None
+        if seen is None or seen.present == present:
+            return None
+        return self._came_or_went(seen, present, self.elapsed(now))
+
+    def _came_or_went(self, seen: RobotSeen, present: bool, at: float) -> Happened | None:
+        was, seen.present = seen.present, present
+        if not present:
+            for attempt in list(seen.attempts.values()):
+                self._end(seen, attempt, at, LOST)
+        # Where there is a world, it tells.
+        if self._has_world or was is None:
+            return None
+        words = f"{seen.name} is {'there' if present else 'gone'}"
+        return self._note(Happened(at, "present" if present else "gone", words, seen.name, trial=self.trial))
+
+    def _task_state(self, name: str, state: TaskState) -> None:
+        task = self._task(name)
+        if task is not None and state.trial >= self.trial:
+            task.applicable, task.complete, task.progress = state.applicable, state.complete, state.progress
+
+    def _heard_status(self, status: Status, now: float) -> None:
+        self.status = status
+        self._lead = status.elapsed - now
+        self._enter(status.trial, status.elapsed)
+        for name, facts in status.tasks.items():
+            task = self._task(name)
+            if task is not None:
+                task.applicable, task.complete = bool(facts.get("applicable")), bool(facts.get("complete"))
+                task.progress = _number(facts.get("progress"))
+        for name, facts in status.robots.items():
+            seen = self._robot(name)
+            if seen is not None and seen.present != facts.get("present"):
+                self._came_or_went(seen, bool(facts.get("present")), status.elapsed)
+
+    def _enter(self, trial: int, at: float) -> None:
+        """The world says which trial it is, and how late."""
+        self._has_world = True
+        if trial != self.trial:
+            self._begin_trial(trial)
+        self._latest = max(self._latest, at)
+
+    def _is_now(self, trial: int) -> bool:
+        """Whether what a robot says is about the present trial; where there is no world, robots say which one that is."""
+        if trial > self.trial and not self._has_world:
+            self._begin_trial(trial)
+        return trial == self.trial
+
+    def _begin_trial(self, trial: int) -> None:
+        self._end_all(NEW_TRIAL)
+        self.trial, self._latest = trial, 0.0
+        for task in self.tasks.values():
+            task.applicable, task.complete, task.progress, task.completed_at = False, False, 0.0, None
+
+    def _heard_event(self, one: Happened | None) -> Happened | None:
+        if one is None:
+            return None
+        self._enter(one.trial, one.at)
+        seen = self.robots.get(one.robot or "")
+        if one.kind in {"trial", "trial_over"}:
+            self.faults.clear()
+        elif one.kind == "fault":
+            self.faults[one.fault or one.text] = one.text.removeprefix("fault: ")
+        elif one.kind == "fault_over":
+            self.faults.pop(one.fault or "", None)
+        elif one.kind == "complete" and one.task is not None and (task := self._task(one.task)) is not None:
+            task.complete, task.progress, task.completed_at = True, 1.0, one.at
+        elif one.kind in {"present", "gone"} and seen is not None:
+            self._came_or_went(seen, one.kind == "present", one.at)
+        elif one.kind == "end":
+            self._end_all(OVER)
+        return self._note(one)
+
+    def _note(self, one: Happened) -> Happened:
+        self.happened.append(one)
+        return one
+
+    def _decided(self, made: DecisionMade, now: float) -> Happened | None:
+        one = of_decision(made, self.elapsed(now))
+        seen = self._robot(made.sender)
+        if seen is not None and (threshold := _number(made.terms.get("threshold"))) > 0:
+            seen.threshold = threshold
+        if seen is not None and self._is_now(made.trial):
+            if made.verb == Verb.ACTIVATE:
+                attempt = self._begin(seen, made.task, one.at)
+                attempt.since, attempt.began = one.at, made.cause
+            elif made.task in seen.attempts:
+                self._end(seen, seen.attempts[made.task], one.at, made.cause)
+            elif seen.last is not None and seen.last.task == made.task and seen.last.ended is None:
+                seen.last.until, seen.last.ended = one.at, made.cause
+        return self._note(one)
+
+    def _heard_robot(self, message: Message, now: float) -> None:
+        # The world speaks of bodies too, and is none.
+        seen = None if message.sender.startswith("@") else self._robot(message.sender)
+        if seen is None:
+            return
+        match message:
+            case Hello():
+                seen.tasks = tuple(message.tasks)
+            case Motivations():
+                seen.motivations = message
+            case LinkReport():
+                seen.link = message
+            case Activity() if self._is_now(message.trial):
+                self._begin(seen, message.task, max(self.elapsed(now) - message.active_for, 0.0))
+            case Heartbeat() if self._is_now(message.trial):
+                for attempt in list(seen.attempts.values()):
+                    self._end(seen, attempt, self.elapsed(now), None)
+            case _:
+                pass
+
+    def _begin(self, seen: RobotSeen, task: str, at: float) -> Attempt:
+        """The attempt that goes on of this robot at this task, begun if there is none."""
+        attempt = seen.attempts.get(task)
+        if attempt is None:
+            attempt = seen.attempts[task] = Attempt(seen.name, task, self.trial, at)
+            self.attempts.append(attempt)
+        return attempt
+
+    @staticmethod
+    def _end(seen: RobotSeen, attempt: Attempt, at: float, why: str | None) -> None:
+        attempt.until, attempt.ended = max(at, attempt.since), why
+        seen.last = seen.attempts.pop(attempt.task, None)
+
+    def _end_all(self, why: str) -> None:
+        for seen in self.robots.values():
+            for attempt in list(seen.attempts.values()):
+                self._end(seen, attempt, self._latest, why)
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0
