@@ -20,7 +20,7 @@ import typer
 from lalliance_agents.errors import LallianceError, UserError
 from mission_control.campaign_command import campaign
 from mission_control.chaos import chaos
-from mission_control.deploy.compose_command import deploy
+from mission_control.deploy.deploy_command import deploy
 from mission_control.deploy.keys_command import keys as keys_command
 from mission_control.keeping import tell
 from mission_control.record_command import bag, check_extra, new_recording, record, replay

@@ -36,6 +36,17 @@ Connect = Annotated[
         help="The router to connect to; default: port 7447 of this machine.",
     ),
 ]
+ConnectTimeout = Annotated[
+    float,
+    typer.Option(
+        "--connect-timeout",
+        metavar="SECONDS",
+        min=0.1,
+        max=86400.0,
+        envvar="LALLIANCE_CONNECT_TIMEOUT",
+        help="How long to wait for the router before giving up.",
+    ),
+]
 Parent = Annotated[int | None, typer.Option(hidden=True, help="End when the process with this id does.")]
 
 
@@ -70,6 +81,7 @@ def router(
 def world(
     path: MissionPath,
     connect: Connect = None,
+    connect_timeout: ConnectTimeout = 5.0,
     keys: Keys = None,
     speed: Speed = 1.0,
     seed: Seed = None,
@@ -103,7 +115,8 @@ def world(
         from world_server.server import WorldServer
 
         with contextlib.nullcontext() if journal is None else Journal(journal, mission) as kept:
-            async with await open_bus(endpoint_of(connect, keys), credentials=credentials_from(keys, WORLD)) as bus:
+            shown, endpoint = credentials_from(keys, WORLD), endpoint_of(connect, keys)
+            async with await open_bus(endpoint, timeout=connect_timeout, credentials=shown) as bus:
                 server = WorldServer(
                     mission,
                     bus=bus,
@@ -125,6 +138,7 @@ def robot(
     path: MissionPath,
     name: Annotated[str, typer.Option(help="Which robot of the mission.", show_default=False)],
     connect: Connect = None,
+    connect_timeout: ConnectTimeout = 5.0,
     keys: Keys = None,
     speed: Speed = 1.0,
     seed: Seed = None,
@@ -155,8 +169,8 @@ def robot(
         place = behaviors or mission.robots[name].behaviors
         sets = load_behaviors(place) if place else []
         catalog = None if learned is None else Catalog(learned, name)
-        endpoint = endpoint_of(connect, keys)
-        async with await open_bus(endpoint, credentials=credentials_from(keys, name)) as bus:
+        shown, endpoint = credentials_from(keys, name), endpoint_of(connect, keys)
+        async with await open_bus(endpoint, timeout=connect_timeout, credentials=shown) as bus:
             if parent is None:
                 typer.echo(f"robot {name} of mission {mission.name} is connected to {endpoint}")
             member = Robot(

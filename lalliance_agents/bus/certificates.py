@@ -5,6 +5,7 @@ Certificates hold calendar time, so this is checked against the calendar and not
 """
 
 import datetime
+import os
 import stat
 from pathlib import Path
 
@@ -53,12 +54,22 @@ def _certificate(path: Path) -> x509.Certificate:
 
 def _private_key(path: Path) -> PrivateKeyTypes:
     text = read(path)
-    if (mode := stat.S_IMODE(path.stat().st_mode)) & 0o077:
+    if _others_can_use(path.stat()):
+        mode = stat.S_IMODE(path.stat().st_mode)
         raise KeysError(f"{path}: others can use this private key (mode {mode:04o}); expected chmod 600 {path}")
     try:
         return load_pem_private_key(text, password=None)
     except (ValueError, TypeError, UnsupportedAlgorithm):
         raise KeysError(f"{path}: not a private key in PEM form without a password; {MADE}") from None
+
+
+def _others_can_use(file: os.stat_result) -> bool:
+    """Whether more than its owner, or root and the group that root has let read it, can use a private key.
+
+    The second is how Kubernetes gives a secret to a process without root.
+    """
+    lent = file.st_uid == 0 and os.geteuid() != 0
+    return bool(stat.S_IMODE(file.st_mode) & (0o037 if lent else 0o077))
 
 
 def _check_issued(found: Credentials, own: x509.Certificate, authority: x509.Certificate) -> None:

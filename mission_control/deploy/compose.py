@@ -1,34 +1,34 @@
-"""A mission as a deployment for docker compose: a router, the world server, one service for each robot, and two tools.
+"""The parts of a mission as services of docker compose.
 
-Every service runs the same image without root, on a file system that it cannot write to, and sees only its own keys. All are on
-one network without a way out. What outlives a container is on two named volumes: what robots learned, and the world's journal.
-Where files of the host belong is written relative to the folder of the compose file.
+What outlives a container is on two named volumes. Where files of the host belong is written relative to the folder of the
+compose file.
 """
 
 import os.path
-import shlex
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
-
-from lalliance_agents.bus.credentials import ROUTER, credentials_in
+from lalliance_agents.bus.credentials import credentials_in
 from lalliance_agents.config import Mission
-from lalliance_agents.wire.keys import OPERATOR, WORLD
-
-PORT = 7447
-ENDPOINT = f"tls/router:{PORT}"
-#: Where things are inside a container.
-MISSION, KEYS, LEARNED, WORLD_STATE = "/mission.yaml", "/keys", "/var/lib/lalliance/learned", "/var/lib/lalliance/world"
-SUMMARY = f"{WORLD_STATE}/summary.json"
-#: How often a process that fails is started again: one that ends with a mission's failure comes back no more often either.
-RESTARTS = "on-failure:5"
+from mission_control.deploy.documents import Document
+from mission_control.deploy.parts import (
+    HEALTH,
+    IMAGE,
+    KEYS,
+    LEARNED,
+    MISSION,
+    RESTARTS,
+    USER,
+    WORLD_STATE,
+    Part,
+    parts_of,
+    place,
+)
 
 Service = dict[str, Any]
 
 
-def compose(mission: Mission, path: Path, folder: Path, *, keys: Path, speed: float = 1.0) -> dict[str, Any]:
+def compose(mission: Mission, path: Path, folder: Path, *, keys: Path, speed: float = 1.0) -> Document:
     """The compose file of a mission.
 
     Args:
@@ -38,34 +38,18 @@ def compose(mission: Mission, path: Path, folder: Path, *, keys: Path, speed: fl
         keys: the folder of keys, wherever the environment does not name another one.
         speed: mission seconds per real second.
     """
-    file = _bind(_relative(path, folder), MISSION)
-    keys_of = _Keys(f"${{LALLIANCE_KEYS:-{_relative(keys, folder)}}}")
-    pace = ["--speed", f"{speed:g}"]
-    services = {"router": _router(keys_of.of(ROUTER)), "world": _world(file, keys_of.of(WORLD), pace)}
-    for name, robot in mission.robots.items():
-        later = {"profiles": ["later"]} if robot.joins > 0 else {}
-        services[f"robot-{name}"] = {**_robot(name, file, keys_of.of(name), pace), **later}
-    services |= {"summary": _summary(), "operator": _operator(file, keys_of.of(OPERATOR))}
+    host = _Host(_relative(path, folder), f"${{LALLIANCE_KEYS:-{_relative(keys, folder)}}}")
+    parts = parts_of(mission, speed)
+    services = {"router": _router(parts.router, host), "world": _member(parts.world, host)}
+    for part in parts.robots.values():
+        services[part.name] = {**_member(part, host), **({"profiles": ["later"]} if part.later else {})}
+    services |= {tool.name: _tool(tool, host) for tool in (parts.summary, parts.operator)}
     return {
         "name": f"lalliance-{mission.name.lower()}",
         "services": services,
         "networks": {"bus": {"internal": True}},
-        "volumes": {"learned": {}, "world": {}},
+        "volumes": {LEARNED: {}, WORLD_STATE: {}},
     }
-
-
-def as_text(document: dict[str, Any], words: Sequence[str]) -> str:
-    """A compose file as text, with the command that made it."""
-    return f"# Made by: {shlex.join(words)}\n{yaml.dump(document, Dumper=_Dumper, sort_keys=False, width=120)}"
-
-
-class _Dumper(yaml.SafeDumper):
-    """Writes what occurs twice twice: a person is to read it."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        """Make no anchors."""
-        del data
-        return True
 
 
 def _relative(path: Path, folder: Path) -> str:
@@ -80,79 +64,54 @@ def _bind(source: str, target: str) -> dict[str, Any]:
     return {"type": "bind", "source": source, "target": target, "read_only": True, "bind": bind}
 
 
-def _volume(name: str, target: str, *, read_only: bool = False) -> dict[str, Any]:
-    return {"type": "volume", "source": name, "target": target} | ({"read_only": True} if read_only else {})
+class _Host(NamedTuple):
+    """Where the mission file and the folder of keys are on the host."""
+
+    mission: str
+    keys: str
+
+    def shown_to(self, part: Part) -> list[dict[str, Any]]:
+        """What a part sees of the host, its own keys at their own place in a folder of keys, and its volume."""
+        shown = [_bind(self.mission, MISSION)] if part.mission else []
+        if part.keys is not None:
+            own = credentials_in(Path(), part.keys).folder.as_posix()
+            shown.append(_bind(f"{self.keys}/{own}", f"{KEYS}/{own}"))
+        if part.volume is not None:
+            volume = {"type": "volume", "source": part.volume, "target": place(part.volume)}
+            shown.append(volume | ({"read_only": True} if part.only_reads else {}))
+        return shown
 
 
-class _Keys(NamedTuple):
-    """Where the folder of keys is on the host."""
-
-    folder: str
-
-    def of(self, name: str) -> dict[str, Any]:
-        """The keys of `name`, at their own place in a folder of keys."""
-        place = credentials_in(Path(), name).folder.as_posix()
-        return _bind(f"{self.folder}/{place}", f"{KEYS}/{place}")
-
-
-def _service(command: list[str], volumes: list[dict[str, Any]], environment: dict[str, str]) -> Service:
+def _service(part: Part, host: _Host) -> Service:
     return {
-        "image": "${LALLIANCE_IMAGE:-lalliance}",
+        "image": f"${{LALLIANCE_IMAGE:-{IMAGE}}}",
         # Private keys are readable by their owner only: say who that is.
-        "user": "${LALLIANCE_USER:-10001:10001}",
-        "command": command,
-        "environment": environment,
+        "user": f"${{LALLIANCE_USER:-{USER}:{USER}}}",
+        "command": list(part.command),
+        "environment": dict(part.environment),
         "init": True,
         "read_only": True,
         "tmpfs": ["/tmp"],  # noqa: S108 - inside a container of its own
         "cap_drop": ["ALL"],
         "security_opt": ["no-new-privileges:true"],
         "networks": ["bus"],
-        "volumes": volumes,
+        "volumes": host.shown_to(part),
     }
 
 
-def _member(command: list[str], volumes: list[dict[str, Any]], environment: dict[str, str]) -> Service:
+def _router(part: Part, host: _Host) -> Service:
+    check = {"interval": "3s", "timeout": "5s", "retries": 5, "test": ["CMD", *HEALTH]}
+    return {**_service(part, host), "restart": "unless-stopped", "healthcheck": check}
+
+
+def _member(part: Part, host: _Host) -> Service:
     """A service that takes part in the mission."""
     return {
-        **_service(command, volumes, {"LALLIANCE_KEYS": KEYS, "LALLIANCE_CONNECT": ENDPOINT, **environment}),
-        "restart": RESTARTS,
+        **_service(part, host),
+        "restart": f"on-failure:{RESTARTS}",
         "depends_on": {"router": {"condition": "service_healthy"}},
     }
 
 
-def _router(keys: dict[str, Any]) -> Service:
-    command = ["router", "--listen", f"tls/0.0.0.0:{PORT}"]
-    # It is asked under the name that its certificate holds, by itself.
-    environment = {"LALLIANCE_KEYS": KEYS, "LALLIANCE_CONNECT": f"tls/localhost:{PORT}"}
-    check = {"interval": "3s", "timeout": "5s", "retries": 5, "test": ["CMD", "lalliance", "health"]}
-    return {
-        **_service(command, [keys], environment),
-        "restart": "unless-stopped",
-        "healthcheck": check,
-    }
-
-
-def _world(file: dict[str, Any], keys: dict[str, Any], pace: list[str]) -> Service:
-    command = ["world", MISSION, *pace, "--journal", f"{WORLD_STATE}/journal", "--summary", SUMMARY]
-    return _member(command, [file, keys, _volume("world", WORLD_STATE)], {"LALLIANCE_MISSION": MISSION})
-
-
-def _robot(name: str, file: dict[str, Any], keys: dict[str, Any], pace: list[str]) -> Service:
-    command = ["robot", MISSION, "--name", name, *pace, "--learned", LEARNED]
-    environment = {"LALLIANCE_MISSION": MISSION, "LALLIANCE_NAME": name}
-    return _member(command, [file, keys, _volume("learned", LEARNED)], environment)
-
-
-def _summary() -> Service:
-    """Waits for the end of the mission, prints its summary and exits with its status."""
-    command = ["summary", SUMMARY, "--wait"]
-    service = _service(command, [_volume("world", WORLD_STATE, read_only=True)], {})
-    return {**service, "profiles": ["tools"], "healthcheck": {"disable": True}}
-
-
-def _operator(file: dict[str, Any], keys: dict[str, Any]) -> Service:
-    """Runs commands of an operator's in the mission."""
-    environment = {"LALLIANCE_KEYS": KEYS, "LALLIANCE_CONNECT": ENDPOINT}
-    service = _service(["chaos", MISSION, "status"], [file, keys], environment)
-    return {**service, "profiles": ["tools"], "healthcheck": {"disable": True}}
+def _tool(part: Part, host: _Host) -> Service:
+    return {**_service(part, host), "profiles": ["tools"], "healthcheck": {"disable": True}}
