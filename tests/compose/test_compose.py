@@ -13,6 +13,8 @@ pytestmark = pytest.mark.timeout(600)
 
 DEMO = ROOT / "missions/material_handling.yaml"
 TWO_TASKS = Path(__file__).with_name("mission.yaml")
+#: What an operator says, so that the robots' bodies get on with their tasks.
+HEAL = ("chaos", "/mission.yaml", "heal")
 
 
 def test_the_image_is_small_and_has_no_root(image: str) -> None:
@@ -69,7 +71,9 @@ def test_whatever_fails_the_mission_goes_on(deployed) -> None:
     robot, task = busy()
     team.run("kill", f"robot-{robot}")
     team.wait_for(rf"takes {task} from {robot} \(silence\)")
-    team.run("start", f"robot-{robot}")
+    seconds = heard_again(team, robot)
+    print(f"\na robot was heard {seconds:.2f} s after its start, with a load of {os.getloadavg()[0]:.1f}")
+    assert 0 < seconds / slowness() < 3.0
 
     robot, task = busy()
     team.run("pause", f"robot-{robot}")
@@ -96,21 +100,18 @@ def test_whatever_fails_the_mission_goes_on(deployed) -> None:
     team.strike("world")
     until(lambda: team.restarted("world", restarts), "the world is started again")
 
-    printed = team.run("run", "--rm", "--no-TTY", "summary", timeout=400)
-    assert "Mission two_tasks complete" in printed
+    until(lambda: team.attempt("run", "--rm", "--no-TTY", "operator", *HEAL).returncode == 0, "all bodies are healed")
+    assert "Mission two_tasks complete" in team.run("run", "--rm", "--no-TTY", "summary")
 
 
-def test_a_robot_is_heard_within_three_seconds_of_its_start(deployed) -> None:
-    team: Deployment = deployed(TWO_TASKS)
-    team.up("two_tasks")
-    before = team.wait_for(r"heard ada first at ([\d.]+)")[1]
-    team.run("kill", "robot-ada")
-    team.run("start", "robot-ada")
-    until(lambda: team.wait_for(r"heard ada first at ([\d.]+)")[1] != before, "ada is heard in its next life")
-    heard = float(team.wait_for(r"heard ada first at ([\d.]+)")[1])
-    started = datetime.fromisoformat(team.facts("robot-ada")["State"]["StartedAt"][:26] + "+00:00").timestamp()
-    print(f"\na robot was heard {heard - started:.2f} s after its start, with a load of {os.getloadavg()[0]:.1f}")
-    assert 0 < (heard - started) / slowness() < 3.0
+def heard_again(team: Deployment, robot: str) -> float:
+    """Start a robot that was killed; how long it took from then until it was heard, in seconds."""
+    first = rf"heard {robot} first at ([\d.]+)"
+    before = team.wait_for(first)[1]
+    team.run("start", f"robot-{robot}")
+    until(lambda: team.wait_for(first)[1] != before, f"{robot} is heard in its next life")
+    started = datetime.fromisoformat(team.facts(f"robot-{robot}")["State"]["StartedAt"][:26] + "+00:00").timestamp()
+    return float(team.wait_for(first)[1]) - started
 
 
 def slowness() -> float:

@@ -108,6 +108,19 @@ def test_health_is_asked_of_whoever_it_is_about(processes: Processes) -> None:
     os.kill(pid, signal.SIGCONT)
 
 
+def test_a_member_waits_for_its_router_as_long_as_it_is_told(processes: Processes) -> None:
+    endpoint = free_endpoint()
+    robot = ["robot", "pair.yaml", "--name", "r1", "--connect", endpoint, "--connect-timeout"]
+    given_up = processes.run(*robot, "0.2")
+    assert (given_up.returncode, given_up.stdout) == (2, "")
+    assert given_up.stderr.startswith(f"lalliance: No router could be reached at {endpoint} within 0.2 s")
+    patient = processes.start(*robot, "100")
+    # It is on its way when it holds the library of the bus.
+    until(lambda: "zenoh" in Path(f"/proc/{patient.pid}/maps").read_text())
+    processes.start("router", "--listen", endpoint)
+    read_until(patient, f"robot r1 of mission pair is connected to {endpoint}")
+
+
 def test_a_summary_is_kept_and_told_with_the_missions_status(processes: Processes) -> None:
     endpoint = free_endpoint()
     read_until(processes.start("router", "--listen", endpoint), "listens")

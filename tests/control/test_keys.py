@@ -1,6 +1,7 @@
 """Keys: made once, for their owners only; those that cannot be used get one sentence that names the file and the remedy."""
 
 import importlib
+import os
 import shutil
 import stat
 import sys
@@ -150,6 +151,21 @@ def test_keys_that_cannot_be_used_are_named_with_the_remedy(keys: Path, case: st
     with pytest.raises(KeysError) as caught:
         checked_credentials(keys, "r1")
     assert str(caught.value).startswith(sentence.format(r1=keys / "robots/r1"))
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file to root")
+@pytest.mark.parametrize(("mode", "usable"), [(0o440, True), (0o640, True), (0o460, False), (0o444, False)])
+def test_root_may_let_a_group_read_a_private_key(
+    keys: Path, monkeypatch: pytest.MonkeyPatch, mode: int, usable: bool
+) -> None:
+    """As Kubernetes does for a process without root, which could read it in no other way; the group may do no more."""
+    monkeypatch.setattr(os, "geteuid", lambda: 10001)
+    (keys / "robots/r1/key.pem").chmod(mode)
+    if usable:
+        assert checked_credentials(keys, "r1") == credentials_in(keys, "r1")
+        return
+    with pytest.raises(KeysError, match=f"others can use this private key \\(mode {mode:04o}\\)"):
+        checked_credentials(keys, "r1")
 
 
 def test_keys_that_have_expired_or_are_not_yet_valid_are_refused(tmp_path: Path) -> None:
