@@ -9,6 +9,7 @@ from pathlib import Path
 from lalliance_agents.bus.credentials import ROUTER, Credentials, credentials_in
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
+from lalliance_agents.whole_file import written_whole
 from mission_control.deploy.documents import MADE_BY, Document, as_text
 from mission_control.deploy.kubernetes.objects import Objects
 from mission_control.deploy.parts import MISSION
@@ -55,7 +56,8 @@ def write(texts: dict[str, str], folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
-            (folder / name).write_text(text, encoding="utf-8")
+            with written_whole(folder / name) as file:
+                file.write(text.encode())
     except OSError as error:
         raise UserError(
             f"{folder}: cannot be written to ({error.strerror or error}); expected a folder, or a place for one"
