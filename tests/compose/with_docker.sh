@@ -106,7 +106,7 @@ setpriv --pdeathsig KILL unshare --net --mount --pid --fork --kill-child --mount
     for folder in /run /etc/docker /opt/containerd "$2"; do mkdir -p "$folder"; mount -t tmpfs tmpfs "$folder"; done
     tries=0
     until ip -4 -o addr show tap0 2>/dev/null | grep -q inet || [ $tries -gt 200 ]; do tries=$((tries + 1)); sleep 0.05; done
-    exec tini -s -- nice -n 5 dockerd "$@"' sh --data-root "$HOME_OF_RUN/data" --exec-root "$HOME_OF_RUN/exec" \
+    exec tini -s -- dockerd "$@"' sh --data-root "$HOME_OF_RUN/data" --exec-root "$HOME_OF_RUN/exec" \
     --pidfile "$HOME_OF_RUN/pid" -H "unix://$HOME_OF_RUN/socket" --cgroup-parent "/$NAME" --mtu 1400 \
     >"$HOME_OF_RUN/log" 2>&1 </dev/null 9>&- &
 OUTSIDE=$!
