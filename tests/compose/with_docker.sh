@@ -85,9 +85,10 @@ flock -u 9
 
 HOME_OF_RUN=$(mktemp -d /var/tmp/lalliance-docker.XXXXXX); NAME=${HOME_OF_RUN##*/}
 echo $$ >"$HOME_OF_RUN/owner"
-DAEMON_PID=; NAT=
+DAEMON_PID=; NAT=; COMMAND=
 end() {
     set +e
+    [ -z "$COMMAND" ] || kill "$COMMAND" 2>/dev/null
     [ -z "$DAEMON_PID" ] || kill -9 "$DAEMON_PID" 2>/dev/null
     [ -z "$NAT" ] || kill "$NAT" 2>/dev/null
     for _ in $(seq 200); do [ -n "$DAEMON_PID" ] && [ -d "/proc/$DAEMON_PID" ] || break; sleep 0.05; done
@@ -125,5 +126,9 @@ for _ in $(seq 240); do docker version >/dev/null 2>&1 && break; sleep 0.25; don
 docker version >/dev/null 2>&1 || { tail -n 30 "$HOME_OF_RUN/log" >&2; say "the daemon did not start"; exit 1; }
 docker import - "$BASE_IMAGE" <"$CACHE/base.tar" >/dev/null
 say "running $*"
-status=0; "$@" || status=$?
+# Beside this script, which could not be told to end meanwhile otherwise.
+"$@" &
+COMMAND=$!
+status=0; wait "$COMMAND" || status=$?
+COMMAND=
 exit $status
