@@ -13,8 +13,6 @@ from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.faults import LinkFault, kind_of
 from lalliance_agents.mission_file import parse_mission
 
-pytestmark = pytest.mark.alone
-
 
 @pytest.fixture
 def processes(tmp_path: Path) -> Iterator[Processes]:

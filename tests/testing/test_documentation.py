@@ -9,8 +9,6 @@ from support.processes import MISSIONS, Processes
 
 from mission_control.watch.happened import KINDS
 
-pytestmark = pytest.mark.alone
-
 DOCUMENT = (MISSIONS.parent / "docs" / "testing.md").read_text()
 README = (MISSIONS.parent / "README.md").read_text()
 
