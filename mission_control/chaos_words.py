@@ -25,6 +25,7 @@ from lalliance_agents.mission_errors import one_line, short
 from lalliance_agents.mission_file import read_fault, read_value
 from lalliance_agents.wire.messages import LONGEST, LONGEST_FAULT
 
+_BEGINS_NOW = "an injected fault begins now; expected for=SECONDS for how long it lasts"
 _SHORT = {end: f"link.{end}" for end in ("from", "to", "both")}
 _GLOB = re.compile(r"[A-Za-z0-9_*?-]*[*?][A-Za-z0-9_*?-]*")
 
@@ -52,7 +53,7 @@ def read_injection(words: Iterable[str], mission: Mission) -> Injection:
     for word in words:
         field, value = _read(word)
         _put(content, _SHORT.get(field, field).split("."), value, word)
-    lasts = _length(content.pop("for")) if "for" in content else None
+    lasts = content.pop("for", None)
     if not content.keys() & {"kind", "link", "partition"}:
         raise UserError(
             "no word says what is to fail; expected kind= and robot=, from= and to=, or partition=, "
@@ -60,7 +61,25 @@ def read_injection(words: Iterable[str], mission: Mission) -> Injection:
         )
     if isinstance(delay := content.get("delay"), list):
         content["delay"] = {"uniform": delay}
-    return Injection(_checked(content, mission), lasts)
+    return read_content(content, lasts, mission)
+
+
+def read_content(content: dict[str, Any], lasts: Any, mission: Mission) -> Injection:
+    """A fault as plain data in the fields of a mission file, checked like one in words.
+
+    Args:
+        content: the fault.
+        lasts: how long, in seconds; None: as long as the fault itself says.
+        mission: the mission.
+
+    Raises:
+        UserError: it is no fault, or one that does not fit the mission.
+    """
+    for field in ("at", "until"):
+        if field in content:
+            raise UserError(f"{field}: {_BEGINS_NOW}")
+    length = None if lasts is None else _length(lasts)
+    return Injection(_checked(content, mission), length)
 
 
 def _read(word: str) -> tuple[str, Any]:
@@ -68,7 +87,7 @@ def _read(word: str) -> tuple[str, Any]:
     if not equals or not re.fullmatch(r"\w+(\.\w+)*", field):
         raise UserError(one_line(f"{short(word)!r} is not FIELD=VALUE; expected words like kind=hang"))
     if field in {"at", "until"}:
-        raise UserError(f"{field}: an injected fault begins now; expected for=SECONDS for how long it lasts")
+        raise UserError(f"{field}: {_BEGINS_NOW}")
     if _GLOB.fullmatch(text):
         return field, text
     try:

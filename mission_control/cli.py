@@ -20,6 +20,7 @@ import typer
 from lalliance_agents.errors import LallianceError, UserError
 from mission_control.campaign_command import campaign
 from mission_control.chaos import chaos
+from mission_control.dashboard.command import PORT, Port, dashboard
 from mission_control.deploy.deploy_command import deploy
 from mission_control.deploy.keys_command import keys as keys_command
 from mission_control.keeping import tell
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from lalliance_agents.config import Mission
+    from mission_control.dashboard.beside import Page
     from mission_control.live import Lines
     from mission_control.recording.writer import RecordingWriter
 
@@ -94,6 +96,10 @@ def run(
     recorded: Annotated[
         Path | None, typer.Option("--record", metavar="FILE", help="All that is said is recorded there.")
     ] = None,
+    dashboard_too: Annotated[
+        bool, typer.Option("--dashboard", help="Show it as a web page too; on a terminal the page stays until Ctrl-C.")
+    ] = False,
+    port: Port = PORT,
     plain: Annotated[bool, typer.Option("--plain", help="One line per event instead of the live view.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -127,14 +133,21 @@ def run(
             f"--speed {speed:g} makes {real:.2g} real seconds of silence a failure; a busy machine may see some that are none"
         )
 
+    page = _page(path, port, keys, speed) if dashboard_too else None
+
     def plan(kept: Path) -> Plan:
         own, shown = (None if folder is None else folder.resolve() for folder in (learned, keys))
         beginning = Beginning.of(recall(kept, mission))
         return Plan(path.resolve(), mission, kept.resolve(), beginning, speed, connect, listen, own, shown)
 
     async def launch(kept: Path) -> dict[str, Any]:
-        with _view(mission, console, plain=plain) as view:
-            return await Launcher(plan(kept), view, writer).run()
+        async with page or contextlib.nullcontext():
+            with _view(mission, console, plain=plain) as view:
+                outcome = await Launcher(plan(kept), view, writer, page).run()
+            if page is not None and console.is_terminal and not as_json:
+                console.print("The mission is over; the page stays until Ctrl-C.")
+                await page.stay()
+        return outcome
 
     with _kept(journal) as kept, _recorded(recorded, path, mission) as writer:
         outcome = run_until_told(launch(kept))
@@ -154,6 +167,7 @@ app.command()(hz)
 app.command()(top)
 app.command()(record)
 app.command()(replay)
+app.command()(dashboard)
 
 
 @app.command()
@@ -222,6 +236,16 @@ def _recorded(recorded: Path | None, path: Path, mission: "Mission") -> "Iterato
             yield writer
     except RecordingError as error:
         warn(str(error))
+
+
+def _page(path: Path, port: int, keys: Path | None, speed: float) -> "Page":
+    from lalliance_agents.extras import extra
+
+    with extra("dashboard"):
+        from mission_control.dashboard import program  # noqa: F401 - a missing package is to be told now
+    from mission_control.dashboard.beside import Page
+
+    return Page(path.resolve(), port=port, keys=None if keys is None else keys.resolve(), speed=speed)
 
 
 def _view(mission: "Mission", console: "Console", *, plain: bool) -> "Lines":

@@ -31,6 +31,7 @@ from world_server.history import recall
 from world_server.world import Stage, World
 
 if TYPE_CHECKING:
+    from mission_control.dashboard.beside import Page
     from mission_control.recording.writer import RecordingWriter
 
 #: How long the router may take to listen, in seconds.
@@ -149,12 +150,16 @@ class Launcher:
         plan: what to launch.
         view: where to show what happens.
         writer: the recording of all that is said, if there is to be one.
+        page: the web page that is to be opened, if any; whoever hands it in closes it.
     """
 
-    def __init__(self, plan: Plan, view: View, writer: "RecordingWriter | None" = None) -> None:
+    def __init__(
+        self, plan: Plan, view: View, writer: "RecordingWriter | None" = None, page: "Page | None" = None
+    ) -> None:
         self._plan = plan
         self._view = view
         self._writer = writer
+        self._page = page
         self._clock = MissionClock(plan.speed)
         self._endpoint = plan.endpoint()
         self._router: Child | None = None
@@ -186,6 +191,8 @@ class Launcher:
             async with self._recording(shown), await open_bus(self._endpoint, credentials=shown) as bus:
                 with announced(name, self._endpoint):
                     self._view.locate(name, self._endpoint)
+                    if self._page is not None:
+                        await self._page.open(self._endpoint, self._view.say)
                     return await self._conduct(bus)
         finally:
             await self._end_all()

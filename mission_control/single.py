@@ -62,7 +62,7 @@ def router(
     parent: Parent = None,
 ) -> None:
     """Run a router: where robots, world and operators of a mission meet."""
-    _follow(parent)
+    follow(parent)
     endpoint = endpoint_of(listen, keys)
 
     async def serve() -> None:
@@ -100,7 +100,7 @@ def world(
     parent: Parent = None,
 ) -> None:
     """Run the world server of a mission."""
-    _follow(parent)
+    follow(parent)
     if summary_path is not None:
         check_place(summary_path)
     mission = load_part(path, seed, part="world")
@@ -154,7 +154,7 @@ def robot(
     parent: Parent = None,
 ) -> None:
     """Run one robot of a mission until the mission is over."""
-    _follow(parent)
+    follow(parent)
     mission = load_part(path, seed, part="robot")
     if name not in mission.robots:
         raise UserError(f"{path}: no robot {name!r} in this mission; expected one of {', '.join(mission.robots)}")
@@ -218,7 +218,7 @@ def summary(
     tell(kept_summary(path, wait=wait), as_json=as_json)
 
 
-def _follow(parent: int | None) -> None:
+def follow(parent: int | None) -> None:
     """What a single process does first: log to standard error, and end with its parent if it has one."""
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s", stream=sys.stderr)
     if parent is not None:

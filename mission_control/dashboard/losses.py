@@ -1,0 +1,57 @@
+"""What share of a robot's messages reaches each teammate, as who looks on can tell. Pure.
+
+Whoever looks on hears every robot, through no link rule. So it counts what a robot has said, by task, and knows what each
+teammate could hear of that: its activity on the tasks that the teammate can do too, and its heartbeats if they share a task.
+The teammate's own report says how much of it arrived. The share is taken over the last few reports, and one message less is
+taken for granted, as it may be under way while the report is made.
+"""
+
+from collections import Counter, defaultdict, deque
+from collections.abc import Mapping
+
+from lalliance_agents.wire.messages import LinkReport
+
+#: Reports over which a share is taken; robots make one each second.
+REPORTS = 6
+#: Fewer messages than this tell nothing.
+FEWEST = 4
+
+
+class Losses:
+    """Counts what was said, and compares it with what was heard."""
+
+    def __init__(self) -> None:
+        self._said: defaultdict[str, Counter[str | None]] = defaultdict(Counter)
+        self._reports: defaultdict[tuple[str, str], deque[tuple[int, int]]] = defaultdict(lambda: deque(maxlen=REPORTS))
+
+    def say(self, robot: str, task: str | None) -> None:
+        """A robot announced that it is on a task, or that it is idle."""
+        self._said[robot][task] += 1
+
+    def report(self, report: LinkReport, tasks: Mapping[str, tuple[str, ...]]) -> dict[str, float | None]:
+        """The share lost of what each teammate said, from 0 to 1; None where too little was said to tell.
+
+        Args:
+            report: of the robot that hears.
+            tasks: what each robot can do.
+        """
+        own = frozenset(tasks.get(report.sender, ()))
+        shares: dict[str, float | None] = {}
+        for mate, reception in report.teammates.items():
+            said = self._said.get(mate)
+            audible = 0
+            if said is not None:
+                shared = own.intersection(tasks.get(mate, ()))
+                audible = sum(map(said.__getitem__, shared)) + (said[None] if shared else 0)
+            shares[mate] = self._share(self._reports[report.sender, mate], audible, reception.received)
+        return shares
+
+    @staticmethod
+    def _share(reports: deque[tuple[int, int]], audible: int, received: int) -> float | None:
+        if reports and received < reports[-1][1]:  # the robot has begun a new life
+            reports.clear()
+        reports.append((audible, received))
+        said, heard = audible - reports[0][0], received - reports[0][1]
+        if said < FEWEST:
+            return None
+        return min(max(said - 1 - heard, 0) / (said - 1), 1.0)
