@@ -18,6 +18,7 @@ demo: $(SETUP)  ## a team of robot processes finishes a mission although one of 
 	$(BIN)/lalliance run missions/material_handling.yaml
 
 test: $(SETUP)
+	tests/dashboard/browser.sh
 	$(BIN)/pytest -m "not alone" --numprocesses auto
 	$(BIN)/pytest -m alone
 

@@ -104,5 +104,5 @@ def planned(mission: str, fault: str) -> str:
 
 def test_every_command_of_the_tool_is_in_the_readme(processes: Processes) -> None:
     listed = re.findall(r"^  (\w+)  ", processes.run("--help").stdout, flags=re.MULTILINE)
-    assert len(listed) == 21
+    assert len(listed) == 22
     assert [name for name in listed if f"lalliance {name}" not in README] == []
