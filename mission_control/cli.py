@@ -143,6 +143,8 @@ def run(
     async def launch(kept: Path) -> dict[str, Any]:
         async with page or contextlib.nullcontext():
             with _view(mission, console, plain=plain) as view:
+                if page is not None:
+                    page.say = view.pin
                 outcome = await Launcher(plan(kept), view, writer, page).run()
             if page is not None and console.is_terminal and not as_json:
                 console.print("The mission is over; the page stays until Ctrl-C.")

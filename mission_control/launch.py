@@ -192,7 +192,7 @@ class Launcher:
                 with announced(name, self._endpoint):
                     self._view.locate(name, self._endpoint)
                     if self._page is not None:
-                        await self._page.open(self._endpoint, self._view.say)
+                        await self._page.open(self._endpoint)
                     return await self._conduct(bus)
         finally:
             await self._end_all()

@@ -54,6 +54,10 @@ class Lines:
         """Show where the mission's bus is."""
         self.say(f"mission {mission} runs on the bus at {endpoint}")
 
+    def pin(self, text: str) -> None:
+        """Show a remark that is to stay in sight."""
+        self.say(text)
+
     def say(self, text: str) -> None:
         """Show a remark that is no message of the mission."""
         self._console.print(printable(text), highlight=False, markup=False, soft_wrap=True)
@@ -77,6 +81,7 @@ class LiveView(Lines):
         self._said: deque[str] = deque(maxlen=RETOLD)
         self._name_width = max(map(len, [*mission.robots, *mission.tasks]))
         self._endpoint = ""
+        self._pinned = ""
         self._live = Live(console=console, get_renderable=self._render, refresh_per_second=5, screen=True)
 
     def __enter__(self) -> Self:
@@ -99,6 +104,11 @@ class LiveView(Lines):
         del mission
         self._endpoint = endpoint
 
+    def pin(self, text: str) -> None:
+        """Show a remark for as long as the view lasts, and when it is left."""
+        self._pinned = printable(text)
+        self.say(text)
+
     def say(self, text: str) -> None:
         """Show a remark among the events."""
         self._said.append(printable(text))
@@ -109,6 +119,9 @@ class LiveView(Lines):
         rows = [1, min(len(self._mission.robots), height // 3) + 2, min(len(self._mission.tasks), height // 3) + 2]
         if self._story.faults:
             parts.insert(1, self._faults)
+            rows.insert(1, 1)
+        if self._pinned:
+            parts.insert(1, lambda _: Text(self._pinned, "dim", no_wrap=True))
             rows.insert(1, 1)
         left = max(height - sum(rows) - 2, 3)
         return Group(*(part(row) for part, row in zip(parts, rows, strict=True)), self._events(left))

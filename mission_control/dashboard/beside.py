@@ -22,14 +22,19 @@ class Page:
         port: its port; 0: a free one.
         keys: the folder of keys, if the bus asks for them.
         speed: mission seconds per real second.
+
+    Attributes:
+        say: called with a sentence that says where the page is.
     """
+
+    say: Callable[[str], None]
 
     def __init__(self, mission: Path, *, port: int, keys: Path | None, speed: float) -> None:
         shown = [] if keys is None else ["--keys", str(keys)]
         self._arguments = ["dashboard", str(mission), "--port", str(port), "--speed", repr(speed), "--wait", *shown]
         self._child: Child | None = None
 
-    async def open(self, endpoint: str, say: Callable[[str], None]) -> None:
+    async def open(self, endpoint: str) -> None:
         """Show the mission whose router is at `endpoint`, and say where.
 
         Raises:
@@ -47,7 +52,7 @@ class Page:
             await self._child.wait()
             reason = self._child.last_line.removeprefix("lalliance: ")
             raise UserError(reason or f"the page ended with {self._child.status}")
-        say(line)
+        self.say(line)
 
     def _with(self, endpoint: str) -> Sequence[str]:
         return [*self._arguments, "--connect", endpoint]
