@@ -6,7 +6,7 @@ chronicle up to a version is new to all that is above it. How much is kept of th
 """
 
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
@@ -90,6 +90,7 @@ class Chronicle:
         story: takes the sightings; nobody else hands it any.
         robots: those of the mission file, in its order, with the tasks that each can do; empty if that is not known.
         tasks: the same.
+        literal: robots that do not hear teammates on tasks that they cannot do (erratum 17, literal).
 
     Attributes:
         now: the present instant, in seconds since the first trial began.
@@ -104,6 +105,7 @@ class Chronicle:
         story: Story,
         robots: dict[str, tuple[str, ...]] | None = None,
         tasks: list[str] | None = None,
+        literal: Collection[str] = (),
     ) -> None:
         self.story = story
         self.now = 0.0
@@ -126,6 +128,7 @@ class Chronicle:
         self._planned = list(tasks or [])
         self._keys = Keys(story.mission)
         self._losses = Losses()
+        self._literal = literal
         self._seen_links: dict[str, LinkReport] = {}
         self._seen_motivations: dict[str, Motivations] = {}
         self._factors_due: dict[str, float] = {}
@@ -316,7 +319,7 @@ class Chronicle:
     def _settle_links(self, name: str, report: LinkReport) -> None:
         self._seen_links[name] = report
         able = self._able or {robot: seen.tasks for robot, seen in self.seen_robots()}
-        lost = self._losses.report(report, able)
+        lost = self._losses.report(report, able, elsewhere=name not in self._literal)
         row = {
             mate: (one.received, _rounded(lost.get(mate)), _rounded(one.silence), one.lost_for is not None)
             for mate, one in report.teammates.items()

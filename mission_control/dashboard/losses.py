@@ -1,14 +1,14 @@
 """What share of a robot's messages reaches each teammate, as who looks on can tell. Pure.
 
 Whoever looks on hears every robot, through no link rule. So it counts what a robot has said, by task, and knows what each
-teammate could hear of that: its activity on the tasks that the teammate can do too, and its heartbeats if they share a task.
-The teammate's own report says how much of it arrived. The share is taken over the last few reports, and one message less is
-taken for granted, as it may be under way while the report is made.
+teammate that shares a task with it could hear of that. The teammate's own report says how much of it arrived. The share is
+taken over the last few reports, and one message less is taken for granted, as it may be under way while the report is made.
 """
 
 from collections import Counter, defaultdict, deque
 from collections.abc import Mapping
 
+from lalliance_agents.model.equations import is_heard
 from lalliance_agents.wire.messages import LinkReport
 
 #: Reports over which a share is taken; robots make one each second.
@@ -28,21 +28,23 @@ class Losses:
         """A robot announced that it is on a task, or that it is idle."""
         self._said[robot][task] += 1
 
-    def report(self, report: LinkReport, tasks: Mapping[str, tuple[str, ...]]) -> dict[str, float | None]:
+    def report(
+        self, report: LinkReport, tasks: Mapping[str, tuple[str, ...]], *, elsewhere: bool
+    ) -> dict[str, float | None]:
         """The share lost of what each teammate said, from 0 to 1; None where too little was said to tell.
 
         Args:
             report: of the robot that hears.
             tasks: what each robot can do.
+            elsewhere: whether it hears teammates also on tasks that it cannot do (erratum 17).
         """
         own = frozenset(tasks.get(report.sender, ()))
         shares: dict[str, float | None] = {}
         for mate, reception in report.teammates.items():
-            said = self._said.get(mate)
             audible = 0
-            if said is not None:
-                shared = own.intersection(tasks.get(mate, ()))
-                audible = sum(map(said.__getitem__, shared)) + (said[None] if shared else 0)
+            if own.intersection(tasks.get(mate, ())) and mate in self._said:
+                said = self._said[mate].items()
+                audible = sum(count for task, count in said if is_heard(task is None, task in own, elsewhere))
             shares[mate] = self._share(self._reports[report.sender, mate], audible, reception.received)
         return shares
 

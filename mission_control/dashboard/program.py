@@ -15,6 +15,7 @@ from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
 from lalliance_agents.extras import extra
 from lalliance_agents.mission_file import parse_mission
+from lalliance_agents.model.parameters import Erratum
 from lalliance_agents.wire.keys import OPERATOR
 from mission_control.dashboard.chronicle import Chronicle
 from mission_control.dashboard.disturb import Absent, Disturber, Operator
@@ -103,7 +104,8 @@ def chronicle_of(mission: str, plan: Mission | None) -> Chronicle:
     if plan is None:
         return Chronicle(Story(mission))
     able = {name: tuple(spec.tasks) for name, spec in plan.robots.items()}
-    return Chronicle(Story(mission), able, list(plan.tasks))
+    literal = {name for name in able if plan.parameters_of(name).is_literal(Erratum.HEARD_ELSEWHERE)}
+    return Chronicle(Story(mission), able, list(plan.tasks), literal)
 
 
 async def show_mission(
