@@ -44,10 +44,11 @@ def compose(mission: Mission, path: Path, folder: Path, *, keys: Path, speed: fl
     for part in parts.robots.values():
         services[part.name] = {**_member(part, host), **({"profiles": ["later"]} if part.later else {})}
     services |= {tool.name: _tool(tool, host) for tool in (parts.summary, parts.operator)}
+    services[parts.dashboard.name] = _page(parts.dashboard, host)
     return {
         "name": f"lalliance-{mission.name.lower()}",
         "services": services,
-        "networks": {"bus": {"internal": True}},
+        "networks": {"bus": {"internal": True}, "page": {}},
         "volumes": {LEARNED: {}, WORLD_STATE: {}},
     }
 
@@ -115,3 +116,9 @@ def _member(part: Part, host: _Host) -> Service:
 
 def _tool(part: Part, host: _Host) -> Service:
     return {**_service(part, host), "profiles": ["tools"], "healthcheck": {"disable": True}}
+
+
+def _page(part: Part, host: _Host) -> Service:
+    """A page for browsers of the host alone, which cannot be reached on a network without a way out."""
+    shown = {"networks": ["bus", "page"], "ports": [f"127.0.0.1:${{LALLIANCE_PAGE:-{part.page}}}:{part.page}"]}
+    return {**_service(part, host), **shown, "profiles": ["dashboard"]}

@@ -1,7 +1,8 @@
-"""Who runs what in the deployment of a mission, whatever runs the containers: router, world server, robots, and two tools.
+"""Who runs what in the deployment of a mission, whatever runs the containers: router, world server, robots, and three tools.
 
 Every part runs the same image without root, on a file system that it cannot write to, and sees only its own keys. All are on
-one network without a way out. What outlives a container is on volumes: what robots learned, and the world's journal.
+one network without a way out; the page alone is shown on another one. What outlives a container is on volumes: what robots
+learned, and the world's journal.
 """
 
 from collections.abc import Mapping
@@ -11,7 +12,7 @@ from lalliance_agents.bus.credentials import ROUTER
 from lalliance_agents.config import Mission
 from lalliance_agents.wire.keys import OPERATOR, WORLD
 
-PORT = 7447
+PORT, PAGE = 7447, 8080
 ENDPOINT = f"tls/router:{PORT}"
 #: What the image is called unless somebody says otherwise, and the user and group as whom it runs.
 IMAGE, USER = "lalliance", 10001
@@ -39,6 +40,7 @@ class Part:
         volume: which volume it sees; None: none.
         only_reads: whether it may not write to that volume.
         later: whether it joins a mission that is under way, and is to be started then.
+        page: the port on which it shows a page; None: it shows none.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Part:
     volume: str | None = None
     only_reads: bool = False
     later: bool = False
+    page: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +62,7 @@ class Parts:
         robots: by the robots' names.
         summary: waits for the end of the mission, prints its summary and exits with its status.
         operator: runs commands of an operator's in the mission.
+        dashboard: shows the mission as a web page.
     """
 
     router: Part
@@ -66,6 +70,7 @@ class Parts:
     robots: Mapping[str, Part]
     summary: Part
     operator: Part
+    dashboard: Part
 
 
 def parts_of(mission: Mission, speed: float) -> Parts:
@@ -82,6 +87,7 @@ def parts_of(mission: Mission, speed: float) -> Parts:
         robots={name: _robot(name, pace, later=robot.joins > 0) for name, robot in mission.robots.items()},
         summary=Part("summary", ("summary", SUMMARY, "--wait"), mission=False, volume=WORLD_STATE, only_reads=True),
         operator=Part("operator", ("chaos", MISSION, "status"), _on_the_bus(), keys=OPERATOR),
+        dashboard=_dashboard(pace),
     )
 
 
@@ -109,3 +115,9 @@ def _robot(name: str, pace: tuple[str, ...], *, later: bool) -> Part:
     command = ("robot", MISSION, "--name", name, *pace, "--learned", place(LEARNED))
     environment = _on_the_bus(LALLIANCE_MISSION=MISSION, LALLIANCE_NAME=name)
     return Part(f"robot-{name}", command, environment, keys=name, volume=LEARNED, later=later)
+
+
+def _dashboard(pace: tuple[str, ...]) -> Part:
+    everywhere = "0.0.0.0"  # noqa: S104 - inside a container of its own
+    command = ("dashboard", MISSION, *pace, "--host", everywhere, "--port", f"{PAGE}", "--wait")
+    return Part("dashboard", command, _on_the_bus(), keys=OPERATOR, page=PAGE)

@@ -48,7 +48,7 @@ def test_every_robot_has_a_service_with_its_own_keys_alone(processes: Processes)
         "lalliance: warning: pair.yaml: who joins later is to be started by hand, with docker compose up -d: robot-r2 at 2 s\n"
     )
     services = yaml.safe_load(done.stdout)["services"]
-    assert list(services) == ["router", "world", "robot-r1", "robot-r2", "summary", "operator"]
+    assert list(services) == ["router", "world", "robot-r1", "robot-r2", "summary", "operator", "dashboard"]
     assert services["robot-r2"]["profiles"] == ["later"]
     bound = {
         name: [volume["source"] for volume in service["volumes"] if volume["type"] == "bind"]
@@ -62,7 +62,10 @@ def test_every_robot_has_a_service_with_its_own_keys_alone(processes: Processes)
         "robot-r2": [mission, f"{keys}/robots/r2"],
         "summary": [],
         "operator": [mission, f"{keys}/operator"],
+        "dashboard": [mission, f"{keys}/operator"],
     }
+    assert [name for name, service in services.items() if service["networks"] != ["bus"]] == ["dashboard"]
+    assert services["dashboard"]["ports"] == ["127.0.0.1:${LALLIANCE_PAGE:-8080}:8080"]
 
 
 def test_the_keys_that_are_named_must_be_those_of_the_mission(processes: Processes) -> None:

@@ -30,6 +30,7 @@ deadline: 60
 """
 
 Object = dict[str, Any]
+DEPLOYMENTS = ("router", "operator", "dashboard")
 
 
 @pytest.fixture
@@ -98,7 +99,7 @@ def test_a_cluster_of_any_version_in_use_takes_them(objects: list[Object]) -> No
             assert validate(one, version, strict=True) == version
     for name, pod in pods(objects).items():
         # What no schema says: a job's pods are not started again for ever, a deployment's are.
-        assert pod.get("restartPolicy") == {"router": None, "operator": None, "summary": "Never"}.get(name, "OnFailure")
+        assert pod.get("restartPolicy") == {**dict.fromkeys(DEPLOYMENTS), "summary": "Never"}.get(name, "OnFailure")
 
 
 def test_all_that_a_pod_names_is_there(objects: list[Object]) -> None:

@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 from support.processes import Processes, is_stopped, read_until, until, words_of
 
-pytestmark = pytest.mark.alone
-
 TEAM = """
 name: team
 tasks: {a: {}, b: {}}
@@ -114,6 +112,7 @@ def test_a_mission_whose_robots_were_all_killed_by_an_operator_lasts_until_its_d
     assert processes.alive() == []
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_stopped_robot_does_not_stay_whatever_ends_the_run(
     processes: Processes, team: Path, number: signal.Signals

@@ -11,8 +11,6 @@ from support.processes import MISSIONS, Processes, read_until, until
 from lalliance_agents.bus.router import free_endpoint
 from mission_control.keeper import RESTARTS
 
-pytestmark = pytest.mark.alone
-
 SMALL = """
 name: small
 tasks: {a: {}, b: {}, c: {}}
@@ -74,6 +72,7 @@ def test_robots_of_a_router_elsewhere_come_back_when_it_does(processes: Processe
     assert second.poll() is None
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 @pytest.mark.parametrize("grown", [1, 2, 3, 4, 5])
 def test_wherever_the_launcher_is_stopped_no_process_stays(
@@ -86,6 +85,7 @@ def test_wherever_the_launcher_is_stopped_no_process_stays(
     until(lambda: processes.alive() == [], seconds=2.0)
 
 
+@pytest.mark.alone
 def test_a_running_mission_ends_within_two_seconds_of_ctrl_c(processes: Processes) -> None:
     run = processes.start("run", MISSIONS / "material_handling.yaml", "--plain")
     read_until(run, "pusher starts")
@@ -123,6 +123,7 @@ def make():
 """
 
 
+@pytest.mark.alone
 def test_a_robots_own_code_can_neither_hold_the_launcher_nor_leave_a_process(processes: Processes, small: Path) -> None:
     (processes.folder / "chatty.py").write_text(CHATTY)
     small.write_text(SMALL.replace("left: {", "left: {behaviors: 'chatty:make', "))

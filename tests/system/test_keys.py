@@ -20,8 +20,6 @@ from lalliance_agents.wire.messages import ChaosCommand, encode
 from mission_control.recording.reader import sightings
 from mission_control.watch.sighting import read
 
-pytestmark = pytest.mark.alone
-
 TEAM = """\
 name: team
 tasks: {a: {}, b: {}, c: {after: [a]}, d: {after: [b]}}

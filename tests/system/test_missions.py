@@ -6,8 +6,6 @@ import pytest
 import yaml
 from support.processes import MISSIONS, Processes
 
-pytestmark = pytest.mark.alone
-
 NAMES = ["material_handling", "box_pushing", "hazardous_waste", "janitorial"]
 
 
@@ -39,6 +37,7 @@ faults: [{{at: {at}, robot: worker, kind: crash}}]
 TRANSPORT = 0.05
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("at", [4.0, 4.07, 4.14])
 def test_from_sigkill_to_takeover_within_tau_and_delay_and_one_control_period(
     processes: Processes, tmp_path: Path, at: float
@@ -59,6 +58,7 @@ def test_from_sigkill_to_takeover_within_tau_and_delay_and_one_control_period(
     assert fault["fired_at"] == takeover["failed_at"]
 
 
+@pytest.mark.alone
 def test_thirty_robots_keep_their_control_period(processes: Processes, tmp_path: Path) -> None:
     names = [f"r{index:02d}" for index in range(30)]
     tasks = [f"t{index:02d}" for index in range(60)]

@@ -12,8 +12,6 @@ from typing import Any
 import pytest
 from support.processes import TESTS, Processes, read_until, until
 
-pytestmark = pytest.mark.alone
-
 #: With the names of the documents; it lasts for as long as it is looked at.
 MISSION = """
 name: material_handling

@@ -18,8 +18,6 @@ from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.wire.keys import Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message, Status, TaskState
 
-pytestmark = pytest.mark.alone
-
 KILLS = 50
 
 LONG = """

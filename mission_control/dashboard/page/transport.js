@@ -26,6 +26,7 @@ export class Transport {
     if (act) {
       event.preventDefault();
       act();
+      this.render(); // at once: the next key may be one that the slider itself takes
     }
   }
 

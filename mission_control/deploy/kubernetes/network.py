@@ -7,7 +7,7 @@ from mission_control.deploy.kubernetes.pods import COMPONENT, labels
 from mission_control.deploy.parts import PORT
 
 #: Who calls the router.
-CALLERS = ("world", "robot", "operator")
+CALLERS = ("world", "robot", "operator", "dashboard")
 
 
 def policies() -> list[Document]:

@@ -34,6 +34,7 @@ class Objects:
         parts, names = parts_of(mission, speed), names_of_robots(path, mission.robots)
         self.namespace = name_of(path, "mission", mission.name)
         self._router, self._operator = (Named(part, part.name, part.name) for part in (parts.router, parts.operator))
+        self._dashboard = Named(parts.dashboard, parts.dashboard.name, parts.dashboard.name)
         self._world = Named(parts.world, "world", "world", claim=WORLD_STATE)
         self._summary = Named(parts.summary, "summary", "summary", claim=WORLD_STATE)
         self._robots = [
@@ -51,11 +52,12 @@ class Objects:
             "robots.yaml": [one for robot in self._robots for one in _member(robot)],
             "summary.yaml": [_summary(self._summary, beside=self._world)],
             "operator.yaml": [_sleeping(self._operator)],
+            "dashboard.yaml": [_page(self._dashboard)],
         }
 
     def secrets(self) -> dict[str, str]:
         """Whose keys each secret holds, by the secrets' names."""
-        everybody = (self._router, self._world, self._operator, *self._robots)
+        everybody = (self._router, self._world, self._operator, self._dashboard, *self._robots)
         return {one.secret: one.part.keys for one in everybody if one.part.keys is not None}
 
 
@@ -126,6 +128,12 @@ def _sleeping(one: Named) -> Document:
     """A part that is there when somebody asks for it, and does what it is told from outside."""
     asleep = {name: value for name, value in container(one).items() if name != "args"}
     return _deployment(one, {**asleep, "command": ["sleep", "infinity"]}, replicas=0)
+
+
+def _page(one: Named) -> Document:
+    """A page that is shown when somebody asks for it, to whoever may forward its port."""
+    listens = {"ports": [{"name": "page", "containerPort": one.part.page}]}
+    return _deployment(one, {**container(one), **listens}, replicas=0)
 
 
 def _deployment(one: Named, runs: dict[str, Any], *, replicas: int) -> Document:
