@@ -172,7 +172,10 @@ def run_one(w: Memory, rules: Rules, missions: Missions, number: int, log: np.nd
 
 
 @compiled
-def _result(w: Memory, result: np.ndarray) -> None:
+def _result(w: Memory, rules: Rules, result: np.ndarray) -> None:
+    for robot in range(w.n):
+        if not w.r_dead[robot]:
+            beat_until(w, rules, robot, w.now)
     result[0] = w.last_end - w.began if w.left == 0 else math.nan
     result[1] = w.activations
     result[2] = w.takeovers
@@ -187,7 +190,7 @@ def _run_some(
     w, rules = team[0], laws[0]
     for number in range(first, until):
         run_one(w, rules, missions, number, log)
-        _result(w, results[number])
+        _result(w, rules, results[number])
 
 
 RESULTS = ("makespan", "activations", "takeovers", "sent", "decisions")

@@ -69,15 +69,16 @@ def next_beat(w: Memory, rules: Rules, robot: int) -> int:
 @compiled
 def beat_until(w: Memory, rules: Rules, robot: int, until: float) -> None:
     """Let a robot make all announcements up to and including the instant `until`."""
+    counts = 0 if w.r_quiet[robot] else 1
     many = math.floor((until - w.r_due[robot]) * rules.rate) - 1.0
     if many > 0.0:
         w.r_due[robot] += many * rules.period
-        w.sent += int(many)
+        w.sent += int(many) * counts
     step = next_beat(w, rules, robot)
     while instant(w, rules, robot, step) <= until:
         w.r_beat[robot] = step
         w.r_due[robot] += rules.period
-        w.sent += 1
+        w.sent += counts
         step = next_beat(w, rules, robot)
 
 
@@ -103,6 +104,7 @@ def say(w: Memory, rules: Rules, robot: int, what: int, step: int) -> None:
     w.r_old_last[robot] = last_beat(w, rules, robot) + rules.delay
     w.r_old_length[robot] = last_beat(w, rules, robot) - w.r_said_since[robot]
     w.r_saying[robot] = what
+    w.r_quiet[robot] = 0
     w.r_flying[robot] = 1
     w.r_said_since[robot] = w.now
     w.r_beat[robot] = step

@@ -129,6 +129,7 @@ def _begin_robot(w: Memory, rules: Rules, robot: int) -> None:
     w.r_open[robot] = w.r_sets[robot]
     w.r_settle_at[robot] = INFINITY
     w.r_saying[robot] = NOTHING
+    w.r_quiet[robot] = 1
     w.r_heard[robot] = NOTHING
     w.r_flying[robot] = 0
     w.r_said_since[robot] = 0.0

@@ -69,6 +69,7 @@ _ROBOT = {
     "knows": "u1",
     # its announcements
     "saying": "i8",  # task, IDLE or NOTHING
+    "quiet": "i8",  # whether it announces nothing: idle, with erratum 4 literal, or not yet begun
     "said_since": "f8",  # since when it has been active, as it says
     "beat": "i8",  # the step of its latest announcement
     "due": "f8",  # when the next one is due

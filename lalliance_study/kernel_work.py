@@ -211,5 +211,6 @@ def rest(w: Memory, rules: Rules, robot: int, step: int) -> None:
     else:
         w.r_old_last[robot] = last_beat(w, rules, robot) + rules.delay
         w.r_old_length[robot] = last_beat(w, rules, robot) - w.r_said_since[robot]
+        w.r_quiet[robot] = 1
         hush(w, rules, robot)
     act_soon(w, rules, robot, -1)

@@ -59,7 +59,8 @@ def _in_processes(work: Callable[..., T], parts: Iterator[tuple[Any, ...]], jobs
     except BrokenProcessPool:
         raise LallianceError("a process that did a part of the work was killed; is memory short?") from None
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+        # Not to wait although all is done would leave the interpreter to end it, which can fail at that (seen once).
+        pool.shutdown(wait=through, cancel_futures=True)
         if not through:
             # Told to end early: nobody will ask for what they are at.
             for child in multiprocessing.active_children():

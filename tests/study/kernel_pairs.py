@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import track
 
 from lalliance_agents.model.parameters import Erratum, Parameters
-from lalliance_study.kernel import run_logged
+from lalliance_study.kernel import RESULTS, run_logged
 from lalliance_study.kernel_state import CAUSES, rules_of
 from lalliance_study.scenarios import Missions, Scenario, draw_missions, mission_of
 from lalliance_study.simulator import Simulator
@@ -38,6 +38,14 @@ class Event(NamedTuple):
     what: str
     task: str
     why: str
+
+
+class Told(NamedTuple):
+    """What one of the two says of a mission."""
+
+    log: list[Event]
+    sent: int
+    """Announcements; the kernel's end when the world finds the mission over, the simulator's when the robots hear of it."""
 
 
 def draw_parameters(chance: random.Random) -> dict[str, Any]:
@@ -111,7 +119,7 @@ def draw_point(seed: int, **fixed: Any) -> tuple[Scenario, Parameters]:
     return made.model_copy(update={"cap": cap}), Parameters.model_validate(parameters)
 
 
-def simulated(scenario: Scenario, parameters: Parameters, missions: Missions, number: int) -> list[Event]:
+def simulated(scenario: Scenario, parameters: Parameters, missions: Missions, number: int) -> Told:
     """What the exact simulator makes of a mission, with the makespan at the end."""
     mission, circumstances = mission_of(scenario, parameters, missions, number)
     simulator = Simulator(mission, circumstances=circumstances)
@@ -123,10 +131,10 @@ def simulated(scenario: Scenario, parameters: Parameters, missions: Missions, nu
         if line.who in names and line.why in CAUSES
     ]
     ends = {task: one["completed_at"] for task, one in summary["tasks"].items()}
-    return _with_ends(events, ends, summary["makespan"])
+    return Told(_with_ends(events, ends, summary["makespan"]), summary["messages"]["sent"])
 
 
-def compiled(scenario: Scenario, parameters: Parameters, missions: Missions, number: int) -> list[Event]:
+def compiled(scenario: Scenario, parameters: Parameters, missions: Missions, number: int) -> Told:
     """The same from the kernel."""
     mission, _ = mission_of(scenario, parameters, missions, number)
     result, log, ends = run_logged(rules_of(mission), missions, number)
@@ -141,7 +149,8 @@ def compiled(scenario: Scenario, parameters: Parameters, missions: Missions, num
         for line in log
     ]
     completed = {f"t{task:02}": None if math.isnan(end) else float(end) for task, end in enumerate(ends)}
-    return _with_ends(events, completed, None if math.isnan(result[0]) else float(result[0]))
+    makespan = None if math.isnan(result[0]) else float(result[0])
+    return Told(_with_ends(events, completed, makespan), int(result[RESULTS.index("sent")]))
 
 
 def _with_ends(events: list[Event], ends: dict[str, float | None], makespan: float | None) -> list[Event]:
@@ -170,9 +179,11 @@ def difference(seed: int, *, missions: int = 2, **fixed: Any) -> str | None:
     scenario, parameters = draw_point(seed, **fixed)
     drawn = draw_missions(scenario, missions, seed=seed)
     for number in range(missions):
-        found = first_difference(
-            simulated(scenario, parameters, drawn, number), compiled(scenario, parameters, drawn, number)
-        )
+        exact, quick = (way(scenario, parameters, drawn, number) for way in (simulated, compiled))
+        found = first_difference(exact.log, quick.log)
+        # The kernel counts those of the live trial alone.
+        if found is None and not scenario.training and abs(exact.sent - quick.sent) > scenario.robots:
+            found = f"the simulator's robots announce {exact.sent} times, the kernel's {quick.sent}"
         if found is not None:
             return f"seed {seed}, mission {number}, {scenario!r}, {parameters.model_dump(exclude_unset=True)}: {found}"
     return None
