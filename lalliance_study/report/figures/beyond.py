@@ -1,7 +1,8 @@
 """Beyond the paper: rivals, what knowledge is worth, what literal readings cost, and how much parameters matter."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from itertools import chain
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -104,6 +105,7 @@ def _dotted(
     marks = [Line2D([], [], linestyle="none", marker="o", color=COLOURS[group], label=group) for group in groups]
     marks.append(Line2D([], [], linestyle="none", marker="x", color=GREY, label="leaves more than 1 % more unfinished"))
     figure.legend(handles=marks, loc="outside lower center", ncols=4)
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 0.96, 1.0))  # room for the numbers right of the last panels
     return figure
 
 
@@ -123,7 +125,7 @@ def _dotted_panel(axes: "Axes", dots: Dots, rows: Sequence[str], groups: Sequenc
     }
     for number, (group, shares) in enumerate((group, shares) for group, shares in left.items() if shares):
         for place, share in shares.items():
-            told = axes.text(1.02 + 0.11 * number, place, f"{100 * share:.0f}", transform=axes.get_yaxis_transform())
+            told = axes.text(1.02 + 0.14 * number, place, f"{100 * share:.0f}", transform=axes.get_yaxis_transform())
             told.set(color=COLOURS[group], fontsize=7, va="center")
     if any(left.values()):
         axes.text(1.02, 0.0, "% more\nunfinished", transform=axes.transAxes, va="top", fontsize=7, color=GREY)
@@ -168,8 +170,7 @@ def sensitivity(found: Sequence[Measured]) -> Figure:
             for group in dict.fromkeys(circumstances(one.scenario) for one in own):
                 _line_of_values(axes, [one for one in own if circumstances(one.scenario) == group], values, default)
             axes.set(xscale="log", xlabel=told if axes is row[1] else "")
-            axes.set_xticks([*values, default], [f"{value:g}" for value in (*values, default)], fontsize=8)
-            axes.xaxis.set_minor_locator(NullLocator())
+            _label_values(axes, sorted([*values, default]))
             change_axis(axes)
     for axes, told in zip(panels[0], HAND_OVERS.values(), strict=True):
         axes.set_title(told)
@@ -178,6 +179,17 @@ def sensitivity(found: Sequence[Measured]) -> Figure:
     marks = [Line2D([], [], marker="o", color=COLOURS[group], label=group) for group in groups]
     figure.legend(handles=marks, loc="outside lower center", ncols=4)
     return figure
+
+
+def _label_values(axes: "Axes", values: Sequence[float]) -> None:
+    """Ticks of a logarithmic axis at the values; labels of two that are near to one another keep apart."""
+    axes.set_xticks(values, [f"{value:g}" for value in values], fontsize=8)
+    axes.xaxis.set_minor_locator(NullLocator())
+    labels, whole = axes.get_xticklabels(), math.log(values[-1] / values[0])
+    for number, (value, following) in enumerate(pairwise(values)):
+        if math.log(following / value) < 0.06 * whole:
+            labels[number].set_horizontalalignment("right")
+            labels[number + 1].set_horizontalalignment("left")
 
 
 def _line_of_values(axes: "Axes", found: Sequence[Measured], values: Mapping[float, str], default: float) -> None:

@@ -49,19 +49,24 @@ def change_axis(axes: "Axes") -> None:
 
 def ratio_ticks(low: float, high: float) -> list[float]:
     """Round ratios between two, as many as a reader can take in, and 1 where it lies between."""
-    steps = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
+    steps = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
     for step in steps:
         ticks = [1 + step * number for number in range(round(-1 / step) + 1, round(1 / step) + 1)]
         inside = [tick for tick in ticks if low <= tick <= min(high, 2.0)]
         if len(inside) <= 8 and high <= 2.0:
             return inside
-    multiples = (0.1, 0.2, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 20.0, 50.0, 100.0)
+    multiples: tuple[float, ...] = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+    if high < 6 * low:
+        multiples = (*multiples, 0.7, 1.5, 3.0)
     return [tick for tick in multiples if low <= tick <= high]
 
 
 def change(ratio: float) -> str:
     """A ratio as a change in percent, or as a multiple from 2 on."""
-    return f"×{ratio:.3g}" if ratio >= 2 else f"{ratio - 1:+.0%}".replace("+0%", "0%")
+    if ratio >= 2:
+        return f"×{ratio:.3g}"
+    percent = round(100 * (ratio - 1), 6)
+    return f"{percent:+.3g}%" if percent else "0%"
 
 
 def band(axes: "Axes", places: Sequence[float], estimates: Sequence[Estimate], colour: str, **line: Any) -> None:
