@@ -19,7 +19,7 @@ demo: $(SETUP)  ## a team of robot processes finishes a mission although one of 
 
 test: $(SETUP)
 	tests/dashboard/browser.sh
-	$(BIN)/pytest -m "not alone" --numprocesses 3
+	$(BIN)/pytest -m "not alone" --numprocesses 3 --dist worksteal
 	$(BIN)/pytest -m alone
 
 test-compose: $(SETUP)  ## the real image and the deployment, in a docker daemon of its own; needs root on Debian

@@ -28,9 +28,16 @@ def test_the_image_is_small_and_has_no_root(image: str) -> None:
 def test_every_service_is_confined(deployed) -> None:
     """As compose understands the file, whatever its text says."""
     shown = yaml.safe_load(deployed(DEMO, ROOT / "deploy/compose.yaml").run("--profile", "*", "config"))
-    assert [network.get("internal") for network in shown["networks"].values()] == [True]
-    assert len(shown["services"]) == 8
-    for service in shown["services"].values():
+    assert {name: network.get("internal", False) for name, network in shown["networks"].items()} == {
+        "bus": True,
+        "page": False,
+    }
+    assert len(shown["services"]) == 9
+    page = shown["services"]["dashboard"]
+    assert [(one["host_ip"], one["target"]) for one in page.pop("ports")] == [("127.0.0.1", 8080)]
+    assert page["networks"].keys() == {"bus", "page"}
+    for name, service in shown["services"].items():
+        assert name == "dashboard" or service["networks"].keys() == {"bus"}
         assert service["read_only"]
         assert service["init"]
         assert service["cap_drop"] == ["ALL"]
@@ -42,6 +49,8 @@ def test_every_service_is_confined(deployed) -> None:
 def test_the_demo_mission_is_completed_although_a_container_is_killed(deployed) -> None:
     demo: Deployment = deployed(DEMO, ROOT / "deploy/compose.yaml")
     demo.up("material_handling")
+    demo.run("up", "--detach", "--pull", "never", "dashboard")
+    until(lambda: "the page of mission material_handling" in demo.run("logs", "dashboard"), "the page is shown")
     task = demo.wait_for(r"lifter starts (crate-[\w]+)")[1]
     demo.run("kill", "robot-lifter")
     demo.wait_for(rf"takes {task} from lifter \(silence\)")
