@@ -10,22 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission_control.shell import DEFAULT_ENDPOINT, AsJson, Keys, MissionPath, run_until_told
+from mission_control.shell import AsJson, Connect, Keys, MissionPath, run_until_told
 
 if TYPE_CHECKING:
     from lalliance_agents.config import Mission
     from lalliance_agents.wire.messages import ChaosAnswer
 
 chaos = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
-
-Connect = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ENDPOINT",
-        envvar="LALLIANCE_CONNECT",
-        help=f"The router to connect to; default: that of the mission if it runs on this machine, else {DEFAULT_ENDPOINT}.",
-    ),
-]
 
 
 @chaos.callback()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lalliance_agents.errors import LallianceError, UserError
-from mission_control.shell import DEFAULT_ENDPOINT, AsJson, Keys, MissionPath, Speed, run_until_told, warn
+from mission_control.shell import AsJson, Connect, Keys, MissionPath, Speed, run_until_told, warn
 
 if TYPE_CHECKING:
     from lalliance_agents.config import Mission
@@ -35,14 +35,7 @@ def record(
         Path | None,
         typer.Option(metavar="FILE", help="The recording; default: the mission's name and the time, in this folder."),
     ] = None,
-    connect: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ENDPOINT",
-            envvar="LALLIANCE_CONNECT",
-            help=f"The router to connect to; default: that of the mission if it runs on this machine, else {DEFAULT_ENDPOINT}.",
-        ),
-    ] = None,
+    connect: Connect = None,
     keys: Keys = None,
     speed: Speed = 1.0,
 ) -> None:

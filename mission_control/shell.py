@@ -18,6 +18,15 @@ SECURE_ENDPOINT = "tls/127.0.0.1:7447"
 
 MissionPath = Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file (YAML).", show_default=False)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output.")]
+#: The bus of a mission that runs, for whoever looks at it or disturbs it.
+Connect = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ENDPOINT",
+        envvar="LALLIANCE_CONNECT",
+        help=f"The router to connect to; default: that of the mission if it runs on this machine, else {DEFAULT_ENDPOINT}.",
+    ),
+]
 Keys = Annotated[
     Path | None,
     typer.Option(

@@ -10,8 +10,7 @@ import typer
 
 from lalliance_agents.errors import UserError
 from lalliance_agents.extras import extra
-from mission_control.chaos import Connect
-from mission_control.shell import AsJson, Keys, run_until_told, warn
+from mission_control.shell import AsJson, Connect, Keys, run_until_told, warn
 
 Mission = Annotated[
     str | None,

@@ -14,6 +14,7 @@ from typing import Any
 import msgpack
 
 from lalliance_agents.errors import MessageError
+from lalliance_agents.model.events import OCCASIONS, Cause
 from lalliance_agents.wire.keys import PRESENCE, Keys
 from lalliance_agents.wire.messages import LinkReport, Motivations
 from mission_control.dashboard.losses import Losses
@@ -60,7 +61,7 @@ _ENDED = {
 }
 
 #: Why an attempt begins that takes a task over.
-_TAKEN = frozenset({"silence", "impatience", "released"})
+_TAKEN = frozenset(OCCASIONS) - {Cause.FREE}
 
 
 @dataclass(slots=True)

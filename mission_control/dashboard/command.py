@@ -7,7 +7,7 @@ import typer
 
 from lalliance_agents.errors import UserError
 from lalliance_agents.extras import extra
-from mission_control.shell import DEFAULT_ENDPOINT, Keys, Speed, run_until_told
+from mission_control.shell import Connect, Keys, Speed, run_until_told
 
 Host = Annotated[str, typer.Option(metavar="ADDRESS", help="Where the page listens; default: on this machine only.")]
 Port = Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0: a free one.")]
@@ -18,14 +18,7 @@ def dashboard(
     path: Annotated[
         Path | None, typer.Argument(metavar="[MISSION]", help="The mission file (YAML).", show_default=False)
     ] = None,
-    connect: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ENDPOINT",
-            envvar="LALLIANCE_CONNECT",
-            help=f"The router of the mission; default: if it runs on this machine, its own, else {DEFAULT_ENDPOINT}.",
-        ),
-    ] = None,
+    connect: Connect = None,
     bag: Annotated[Path | None, typer.Option(metavar="FILE", help="Show a recording instead.")] = None,
     host: Host = "127.0.0.1",
     port: Port = PORT,
