@@ -1,16 +1,14 @@
-"""The tables and numbers of `docs/failure-detection.md`, made from rows and from the law.
-
-In the page a generated part stands between `<!-- name -->` and `<!-- end -->`; what is there is replaced. A test compares the
-page with what would be generated, so that no number in it is older than the rows.
-"""
+"""The tables and numbers of `docs/failure-detection.md`, made from rows and from the law."""
 
 import json
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from statistics import fmean, quantiles, stdev
 
+from lalliance_study import markdown
 from lalliance_study.detection.cost import COVERAGE, CRASH_TIMES, OWN_TIMES, ROBOTS, TASKS
 from lalliance_study.detection.law import Loss, Timing, detection_quantile, dispersion, needed_windows, suspicions
 from lalliance_study.detection.plan import BURST, STAIRS_LOSS, TAU_RHOS
@@ -23,7 +21,6 @@ HOUR = 3600.0
 #: False suspicions per pair of robots and hour that somebody may be ready to bear.
 TOLERATED = (60.0, 6.0, 1.0, 0.1)
 CHOICES = (0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-END = "<!-- end -->"
 
 
 def renew(page: Path, rows: Path) -> None:
@@ -33,18 +30,12 @@ def renew(page: Path, rows: Path) -> None:
 
 def renewed(text: str, rows: Path) -> str:
     """A page's text with its generated parts made anew."""
-    for name, made in PARTS.items():
-        before, found, rest = text.partition(f"<!-- {name} -->\n")
-        _, end, after = rest.partition(END)
-        if found and end:
-            text = before + found + made(rows) + end + after
-    return text
+    return markdown.renewed(text, {name: partial(made, rows) for name, made in PARTS.items()})
 
 
 def _markdown(table: Table) -> str:
     head, *body = table
-    lines = [head, ["---", *["--:"] * (len(head) - 1)], *body]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    return markdown.table(head, body, right=True)
 
 
 def setup(rows: Path) -> str:

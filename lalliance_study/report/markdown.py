@@ -1,16 +1,6 @@
-"""Pieces of the report's page."""
-
-from collections.abc import Sequence
+"""Pieces that only the report has."""
 
 from lalliance_study.report.statistics import Estimate
-
-Line = Sequence[str]
-
-
-def table(head: Line, body: Sequence[Line], *, right: bool = False) -> str:
-    """A table; its columns but the first are aligned to the right if they are numbers."""
-    rule = ["---", *(["--:" if right else "---"] * (len(head) - 1))]
-    return "".join(f"| {' | '.join(line)} |\n" for line in (head, rule, *body))
 
 
 def number(estimate: Estimate | None, digits: int = 3) -> str:

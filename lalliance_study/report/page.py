@@ -6,10 +6,11 @@ from string import Template
 
 import numpy as np
 
+from lalliance_study.markdown import table
 from lalliance_study.report.claims import REFUTED, SOMEWHERE, Claim, Finding
 from lalliance_study.report.comparisons import MARGIN
 from lalliance_study.report.independent import ALIKE, known
-from lalliance_study.report.markdown import figure, number, table
+from lalliance_study.report.markdown import figure, number
 from lalliance_study.report.results import FEWEST, Measured, Results
 from lalliance_study.report.sections import CLAIMS, SECTIONS, Section
 from lalliance_study.report.statistics import CONFIDENCE

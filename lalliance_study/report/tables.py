@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from lalliance_study.markdown import table
 from lalliance_study.report import statistics
 from lalliance_study.report.beyond import (
     LEARNERS,
@@ -17,7 +18,7 @@ from lalliance_study.report.beyond import (
 )
 from lalliance_study.report.claims import ratio_of
 from lalliance_study.report.comparisons import Comparison
-from lalliance_study.report.markdown import folded, number, table
+from lalliance_study.report.markdown import folded, number
 from lalliance_study.report.optima import DERIVED, NEAR, log_mean, proven, size
 from lalliance_study.report.results import Measured
 from lalliance_study.report.statistics import Floats
