@@ -127,6 +127,7 @@ async def _replay(path: Path, rate: float, start: float, *, pause: bool, connect
     from mission_control.recording.pace import Pace
     from mission_control.recording.player import Player, check_quiet
     from mission_control.recording.reader import Recording
+    from mission_control.running import announced
     from mission_control.watch.keyboard import keyboard
 
     if connect is not None and connect.startswith(SECURE):
@@ -139,6 +140,7 @@ async def _replay(path: Path, rate: float, start: float, *, pause: bool, connect
         endpoint = connect or free_endpoint()
         if connect is None:
             await opened.enter_async_context(await open_router(endpoint))
+            opened.enter_context(announced(mission, endpoint))
         bus, witness = [await opened.enter_async_context(await open_bus(endpoint)) for _ in range(2)]
         if connect is not None:
             await check_quiet(witness, mission, endpoint)

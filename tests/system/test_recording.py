@@ -120,6 +120,21 @@ async def test_all_of_it_arrives_in_order_when_it_is_replayed_and_says_the_same(
     assert any("carrier took crate-2" in sentence and "lifter silent" in sentence for sentence in before)
 
 
+def test_a_replay_is_found_like_a_mission_and_tells_what_was_before_its_start(
+    demo: tuple[Path, dict[str, Any]], processes: Processes
+) -> None:
+    folder, _ = demo
+    playing = processes.start("replay", folder / "demo.mcap", "--rate", "0.1", "--start", "6")
+    read_until(playing, "replaying mission material_handling")
+    there, from_file = (processes.run("why", *words) for words in ([], ["--bag", folder / "demo.mcap", "--to", "17"]))
+    assert (there.returncode, there.stderr) == (0, "")
+    told = [line for line in from_file.stdout.splitlines() if line.startswith("carrier took crate-2")]
+    assert len(told) == 1
+    assert told[0] in there.stdout.splitlines()
+    playing.send_signal(signal.SIGINT)
+    playing.communicate(timeout=30)
+
+
 @pytest.mark.alone
 def test_what_was_converted_is_as_its_schemas_say(demo: tuple[Path, dict[str, Any]]) -> None:
     folder, _ = demo
