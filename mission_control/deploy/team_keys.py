@@ -28,7 +28,7 @@ def check_team(keys: Path, path: Path, mission: Mission, *, with_router: bool = 
     if strangers:
         raise KeysError(
             f"{keys}: these keys were made for another team, without {', '.join(strangers)} of {path}; "
-            f"expected new ones, in another folder: lalliance keys init {path} --keys FOLDER"
+            f"expected new ones, once these are moved away: lalliance keys init {path} --keys {keys}"
         )
     for name in (*([ROUTER] if with_router else []), WORLD, OPERATOR, *mission.robots):
         credentials_from(keys, name)

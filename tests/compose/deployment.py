@@ -89,14 +89,18 @@ class Deployment:
 
         threading.Thread(target=collect, daemon=True).start()
 
-    def happened(self, pattern: str) -> re.Match[str] | None:
-        """The latest event that matches."""
-        return next((found for line in reversed(self._events) if (found := re.search(pattern, line))), None)
+    def so_far(self) -> int:
+        """How many events there were."""
+        return len(self._events)
 
-    def wait_for(self, pattern: str) -> "re.Match[str]":
-        """Wait for an event that matches, if there was none yet."""
+    def happened(self, pattern: str, since: int = 0) -> re.Match[str] | None:
+        """The latest event that matches, of those after the first `since`."""
+        return next((found for line in reversed(self._events[since:]) if (found := re.search(pattern, line))), None)
+
+    def wait_for(self, pattern: str, since: int = 0) -> "re.Match[str]":
+        """Wait for an event that matches, if there was none yet after the first `since`."""
         found: re.Match[str] = until(
-            lambda: self.happened(pattern), f"{pattern} in\n{chr(10).join(self._events[-40:])}"
+            lambda: self.happened(pattern, since), f"{pattern} in\n{chr(10).join(self._events[-40:])}"
         )
         return found
 

@@ -75,8 +75,8 @@ def test_whatever_fails_the_mission_goes_on(deployed) -> None:
         until(lambda: all(map(team.is_there, ("ada", "bob", "dan", "eve"))), "all are there")
         return until(lambda: on if {"north", "south"} <= set((on := team.workers()).values()) else None, "both are on")
 
-    def alone() -> tuple[str, str]:
-        """A robot that is alone on a task, as is another on the other, so that two are to spare; and which task that is."""
+    def alone() -> tuple[str, str, int]:
+        """A robot that is alone on a task, as is another on the other, so that two are to spare; which task; events so far."""
         taken: dict[str, str] = {}
         for robot, task in busy().items():
             if task in taken.values():
@@ -85,23 +85,24 @@ def test_whatever_fails_the_mission_goes_on(deployed) -> None:
                 until(lambda robot=robot: robot not in team.workers(), f"{robot} is off {task}")
             else:
                 taken[robot] = task
-        return next(iter(busy().items()))
+        before = team.so_far()
+        return *next(iter(busy().items())), before
 
-    robot, task = alone()
+    robot, task, before = alone()
     team.run("kill", f"robot-{robot}")
-    team.wait_for(rf"takes {task} from {robot} \(silence\)")
+    team.wait_for(rf"takes {task} from {robot} \(silence\)", since=before)
     seconds = heard_again(team, robot)
     print(f"\na robot was heard {seconds:.2f} s after its start, with a load of {os.getloadavg()[0]:.1f}")
     assert 0 < seconds / slowness() < 3.0
 
-    robot, task = alone()
+    robot, task, before = alone()
     team.run("pause", f"robot-{robot}")
-    team.wait_for(rf"takes {task} from {robot} \(silence\)")
+    team.wait_for(rf"takes {task} from {robot} \(silence\)", since=before)
     team.run("unpause", f"robot-{robot}")
 
-    robot, task = alone()
+    robot, task, before = alone()
     with team.disconnected(f"robot-{robot}"):
-        team.wait_for(rf"takes {task} from {robot} \(silence\)")
+        team.wait_for(rf"takes {task} from {robot} \(silence\)", since=before)
 
     # Not the one that was taken off the network, whose device has another name now.
     robot = next(one for one in busy() if one != robot)

@@ -74,7 +74,7 @@ def test_the_keys_that_are_named_must_be_those_of_the_mission(processes: Process
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
         "lalliance: keys: these keys were made for another team, without r2 of pair.yaml; "
-        "expected new ones, in another folder: lalliance keys init pair.yaml --keys FOLDER\n"
+        "expected new ones, once these are moved away: lalliance keys init pair.yaml --keys keys\n"
     )
     new_keys(processes.folder / "both", "r1", "r2")
     done = processes.run("deploy", "compose", "pair.yaml", "--folder", "there", "--keys", "both")

@@ -232,7 +232,7 @@ def test_a_mission_with_a_robot_that_has_no_keys_is_refused(processes: Processes
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
         "lalliance: keys: these keys were made for another team, without r3 of three.yaml; "
-        "expected new ones, in another folder: lalliance keys init three.yaml --keys FOLDER\n"
+        "expected new ones, once these are moved away: lalliance keys init three.yaml --keys keys\n"
     )
     done = processes.run("robot", "three.yaml", "--name", "r3", "--keys", "keys")
     assert done.returncode == 2

@@ -234,6 +234,6 @@ def test_what_is_not_ours_is_not_written_over(processes: Processes) -> None:
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
         "lalliance: made/keys: these keys were made for another team, without R_1 of rooms.yaml; "
-        "expected new ones, in another folder: lalliance keys init rooms.yaml --keys FOLDER\n"
+        "expected new ones, once these are moved away: lalliance keys init rooms.yaml --keys made/keys\n"
     )
     assert [file.name for file in made.iterdir()] == ["keys"]
