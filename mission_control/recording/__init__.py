@@ -8,5 +8,6 @@ recording ended.
 
 A recorder ends its chunk and hands it to the system twice a second, so that one that is killed loses less than a second and
 leaves a file that opens: `scan` reads such a file up to its last whole record. `writer` and `reader` are the two ends of the
-format, `recorder` fills a file from a bus, `player` plays one onto a bus, and `convert` makes one that viewers open.
+format, `recorder` fills a file from a bus, `player` plays one onto a bus, and `convert` makes one that viewers open,
+with schemas from `viewer_schema`.
 """

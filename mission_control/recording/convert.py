@@ -1,9 +1,9 @@
 """Makes a recording into one that viewers open: Foxglove and Lichtblick read messages of JSON with schemas, and no msgpack.
 
-They take only part of JSON Schema: each field has one plain type, and nothing is referred to elsewhere. So what may be missing
-is left out where it is missing, instead of being null, and definitions stand where they are used. Numbers are doubles to them:
-a seed, which may be larger than those hold exactly, becomes a text. Whatever is no valid message, or cannot be told like that,
-goes unchanged to one channel of its own, in base64, with what is wrong with it: nothing is left out.
+What they take of JSON Schema is in `viewer_schema`. It wants to know which names there are in maps, before the first message
+is written, so a recording is read twice. What may be missing is left out where it is missing, instead of being null. Numbers
+are doubles to viewers: a seed, which may be larger than those hold exactly, becomes a text. Whatever is no valid message, or
+cannot be told like that, goes unchanged to one channel of its own, in base64, with what is wrong with it: nothing is left out.
 """
 
 import base64
@@ -18,10 +18,11 @@ from mcap.writer import LIBRARY_IDENTIFIER, Writer
 
 from lalliance_agents.errors import MessageError, UserError
 from lalliance_agents.whole_file import written_whole
-from lalliance_agents.wire.keys import Key, Keys
+from lalliance_agents.wire.keys import Keys, Kind
 from lalliance_agents.wire.messages import Message
 from mission_control.recording.format import ABOUT, CONVERTED, ENDING, MOST_CHANNELS, schema_of
 from mission_control.recording.reader import Recording
+from mission_control.recording.viewer_schema import Found, viewer_schema
 from mission_control.recording.writer import check_new
 from mission_control.watch.sighting import Sighting, read
 
@@ -29,6 +30,7 @@ from mission_control.watch.sighting import Sighting, read
 _LARGEST = 2**53 - 1
 #: Below the mission's own keys.
 UNREADABLE = "@unreadable"
+_UNREADABLE_NAME = "lalliance.Unreadable"
 _UNREADABLE_SCHEMA = {
     "title": "Unreadable",
     "type": "object",
@@ -39,11 +41,6 @@ _UNREADABLE_SCHEMA = {
     },
     "required": ["key", "reason", "payload"],
 }
-#: What a schema may say of a field besides its type.
-_KEPT = ("description", "enum", "const", "pattern", "minimum", "maximum", "minLength", "maxLength", "contentEncoding")
-
-
-_SCALARS = ("string", "integer", "number", "boolean")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +69,8 @@ def convert(path: Path, out: Path) -> Converted:
         writer = Writer(file)
         writer.start(CONVERTED, f"lalliance {recording.about.version}; {LIBRARY_IDENTIFIER}")
         writer.add_metadata(ABOUT, recording.about.metadata())
-        channels = _Channels(writer, recording.about.mission)
+        keys = Keys(recording.about.mission)
+        channels = _Channels(writer, keys, _found(recording, keys))
         messages = unreadable = 0
         for sighting in recording:
             document = channels.told(sighting)
@@ -90,11 +88,6 @@ def convert(path: Path, out: Path) -> Converted:
     return Converted(messages, unreadable, recording.broken)
 
 
-def plain_schema(schema: Mapping[str, Any]) -> dict[str, Any]:
-    """A schema as viewers take it, from one that pydantic has made."""
-    return _plain(schema, schema.get("$defs", {}))
-
-
 def plain_content(message: Message) -> dict[str, Any]:
     """A message as its plain schema says.
 
@@ -108,6 +101,29 @@ def plain_content(message: Message) -> dict[str, Any]:
     return content
 
 
+def _found(recording: Recording, keys: Keys) -> dict[Kind, Found]:
+    """What is in the messages of each kind."""
+    found: dict[Kind, Found] = {}
+    for sighting in recording:
+        with contextlib.suppress(MessageError, ValueError):
+            kind, content = _read(sighting, keys)
+            found.setdefault(kind, Found()).add(content)
+    return found
+
+
+def _read(sighting: Sighting, keys: Keys) -> tuple[Kind, dict[str, Any]]:
+    """A sighting as a message of JSON, and of which kind it is.
+
+    Raises:
+        MessageError: it is no valid message.
+        ValueError: it cannot be told to viewers.
+    """
+    key, message = read(sighting, keys)
+    if message is None and sighting.payload:
+        raise MessageError("key", "a message where there are none")
+    return key.kind, {"present": not sighting.gone} if message is None else plain_content(message)
+
+
 class _Told(NamedTuple):
     channel: int
     content: Mapping[str, Any]
@@ -117,20 +133,18 @@ class _Told(NamedTuple):
 class _Channels:
     """The channels of the new file."""
 
-    def __init__(self, writer: Writer, mission: str) -> None:
+    def __init__(self, writer: Writer, keys: Keys, found: Mapping[Kind, Found]) -> None:
         self._writer = writer
-        self._keys = Keys(mission)
+        self._keys = keys
+        self._found = found
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
 
     def told(self, sighting: Sighting) -> _Told:
         """A sighting as a message of JSON."""
         try:
-            key, message = read(sighting, self._keys)
-            if message is None and sighting.payload:
-                raise MessageError("key", "a message where there are none")  # noqa: TRY301 - one place for all that is wrong
-            content = {"present": not sighting.gone} if message is None else plain_content(message)
-            return _Told(self._channel(sighting.key, key), content)
+            kind, content = _read(sighting, self._keys)
+            return _Told(self._channel(sighting.key, kind), content)
         except (MessageError, ValueError) as error:
             told = {
                 "key": sighting.key,
@@ -139,60 +153,28 @@ class _Channels:
             }
             return _Told(self._unreadable(), told, is_unreadable=True)
 
-    def _channel(self, topic: str, key: Key) -> int:
+    def _channel(self, topic: str, kind: Kind) -> int:
         if topic not in self._channels:
-            schema = schema_of(key.kind)
+            schema = schema_of(kind)
             if schema is None or len(self._channels) >= MOST_CHANNELS:
                 raise MessageError("key", "nothing is published on such keys")
-            self._channels[topic] = self._new(topic, schema.name, plain_schema(schema.document))
+            if schema.name not in self._schemas:
+                self._register(schema.name, viewer_schema(schema.document, self._found.get(kind, Found())))
+            self._channels[topic] = self._new(topic, schema.name)
         return self._channels[topic]
 
     def _unreadable(self) -> int:
         topic = f"{self._keys.prefix}{UNREADABLE}"
         if topic not in self._channels:
-            self._channels[topic] = self._new(topic, "lalliance.Unreadable", _UNREADABLE_SCHEMA)
+            self._register(_UNREADABLE_NAME, _UNREADABLE_SCHEMA)
+            self._channels[topic] = self._new(topic, _UNREADABLE_NAME)
         return self._channels[topic]
 
-    def _new(self, topic: str, name: str, schema: Mapping[str, Any]) -> int:
-        if name not in self._schemas:
-            self._schemas[name] = self._writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
-        return self._writer.register_channel(topic, "json", self._schemas[name])
+    def _register(self, name: str, schema: Mapping[str, Any]) -> None:
+        self._schemas[name] = self._writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
 
-
-def _plain(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> dict[str, Any]:
-    while "$ref" in schema:
-        schema = {**definitions[schema["$ref"].rpartition("/")[2]], **{k: v for k, v in schema.items() if k != "$ref"}}
-    choices = [one for one in schema.get("anyOf", ()) if one.get("type") != "null"]
-    if len(choices) > 1:
-        return {"type": [kind for kind in _SCALARS if any(one.get("type") == kind for one in choices)]}
-    if choices:
-        schema = {**choices[0], **{k: v for k, v in schema.items() if k != "anyOf"}}
-        return _plain(schema, definitions)
-    plain = {"type": schema["type"], **{word: schema[word] for word in _KEPT if word in schema}}
-    if schema["type"] == "array":
-        plain["items"] = _plain(schema["items"], definitions)
-    elif schema["type"] == "object":
-        plain |= _plain_object(schema, definitions)
-    return plain
-
-
-def _plain_object(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> dict[str, Any]:
-    fields = schema.get("properties", {})
-    plain: dict[str, Any] = {}
-    if fields:
-        plain["properties"] = {
-            name: {"type": "string", "description": "an integer, which may be larger than a double holds exactly"}
-            if name == "seed"
-            else _plain(field, definitions)
-            for name, field in fields.items()
-        }
-        may_lack = {name for name, field in fields.items() if {"type": "null"} in field.get("anyOf", ())}
-        plain["required"] = [name for name in schema.get("required", ()) if name not in may_lack]
-    others = [*schema.get("patternProperties", {}).values(), schema.get("additionalProperties")]
-    found = next((other for other in others if isinstance(other, Mapping)), None)
-    if found is not None:
-        plain["additionalProperties"] = _plain(found, definitions)
-    return plain
+    def _new(self, topic: str, schema: str) -> int:
+        return self._writer.register_channel(topic, "json", self._schemas[schema])
 
 
 def _without_nothing(value: Any) -> Any:
