@@ -6,7 +6,10 @@ SETUP := .venv/.set-up
 # What a cluster is told as it stands; the kustomization adds the mission and the keys.
 MANIFESTS := $(filter-out %/kustomization.yaml %/mission.yaml,$(wildcard deploy/kubernetes/*.yaml))
 
-.PHONY: demo test test-compose campaign check clean
+.PHONY: demo test test-compose campaign docs check clean
+
+# What MkDocs Material says of its successor is known.
+export NO_MKDOCS_2_WARNING := 1
 
 $(SETUP): pyproject.toml constraints.txt
 	@echo "Setting up .venv: this takes about a minute, and a package index"
@@ -28,6 +31,10 @@ test-compose: $(SETUP)  ## the real image and the deployment, in a docker daemon
 campaign: $(SETUP)  ## random missions with faults, held to what must never fail
 	$(BIN)/lalliance campaign --missions 2000 --seed 1
 
+docs: $(SETUP)  ## the pages of docs/ as a site, in site/; first, what is made from the code is made anew in them
+	PYTHONPATH=docs $(BIN)/python -m made
+	$(BIN)/mkdocs build --quiet
+
 check: $(SETUP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -36,7 +43,8 @@ check: $(SETUP)
 	$(BIN)/hadolint deploy/Dockerfile
 	$(BIN)/check-jsonschema --builtin-schema vendor.compose-spec deploy/compose.yaml
 	$(BIN)/kubernetes-validate --strict --quiet -k 1.29 -k 1.37 $(MANIFESTS)
+	$(BIN)/mkdocs build --quiet
 	if docker compose version >/dev/null 2>&1; then docker compose -f deploy/compose.yaml config --quiet; fi
 
 clean:
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist site

@@ -157,7 +157,7 @@ class LogNormal(Record):
     """A log-normal distribution of delays."""
 
     median: Positive
-    """In seconds."""
+    """What half of the messages exceed, in seconds."""
     sigma: Annotated[float, Field(gt=0, le=5, strict=True, allow_inf_nan=False)]
     """Standard deviation of the logarithm."""
 
@@ -221,7 +221,7 @@ class LinkFault(_Timed):
     loss: Loss | None = None
     """Share of the messages that are lost, or bursts of loss."""
     delay: Delay | None = None
-    """How late they come: seconds, `{uniform: [a, b]}` or `{lognormal: {median: m, sigma: s}}`."""
+    """How late they come, in seconds: a number, `{uniform: [a, b]}` or `{lognormal: {median: m, sigma: s}}`."""
     duplicate: Probability | None = None
     """Share of the messages that come twice."""
     reorder: Probability | None = None

@@ -46,7 +46,7 @@ class Appraisal:
         self._hearing = hearing
         self._learns = parameters.architecture is Architecture.L_ALLIANCE
         literal = parameters.is_literal
-        #: Whether a robot goes on comparing itself with others while it works (erratum 6, literal).
+        #: Whether a robot goes on comparing itself with others while it works (erratum 1, literal).
         self.influence_on_active = literal(Erratum.INFLUENCE_ON_ACTIVE)
         self._reset_on_active = literal(Erratum.RESET_ON_ACTIVE)
         self._slowest_of_all = literal(Erratum.SLOWEST_OF_WHOM)
@@ -54,7 +54,10 @@ class Appraisal:
         self._gives_up = not literal(Erratum.GIVE_UP_RULE)
 
     def adaptive(self, one: Motivation, moment: Moment, *, suppressed: bool) -> Factors:
-        """The factors of `one` in the adaptive phase; its motivation is left at 0 for the caller to fill in."""
+        """The factors of `one` in the adaptive phase; its motivation is left at 0 for the caller to fill in.
+
+        activity_suppression_ij(t): 0 while another set is active, which the caller says by `suppressed`.
+        """
         on_task = self._hearing.on_task(one.task, moment.now)
         expected = self._expect(one, moment.present, contended=bool(on_task))
         pace, rate = self._impatience(one, moment, expected, on_task)
@@ -100,7 +103,7 @@ class Appraisal:
         return one.expectation
 
     def learning(self, one: Motivation, moment: Moment, *, suppressed: bool) -> Factors:
-        """The factors of `one` in the active learning phase: no impatience, no acquiescence, no giving up."""
+        """m_ij(t), active learning phase: the factors of `one`; no impatience, no acquiescence, no giving up."""
         own_time = self._knowledge.own_time(one.task)
         return Factors(
             motivation=0.0,

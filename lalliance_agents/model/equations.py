@@ -38,7 +38,7 @@ def ramp_reaches(base: float, since: float, rate: float, limit: float) -> float:
 
 
 def in_window(instant: float, after: float, until: float, closed: bool = True) -> bool:
-    """comm_received's time span: (after, until] when `closed`, or open at both ends (erratum 7, literal)."""
+    """comm_received: whether an instant lies in (after, until], or, if not `closed`, in (after, until) (erratum 7, literal)."""
     if closed:
         return after + SLACK < instant <= until + SLACK
     return after < instant < until
@@ -172,7 +172,7 @@ def slow_rate(threshold: float, patience_time: float) -> float:
 
 
 def scale_factor(min_delay: float, max_delay: float, low: float, high: float) -> float:
-    """The share of delay per second of task time; 0 where all times are the same.
+    """scale_factor: the share of delay per second of task time; 0 where all times are the same.
 
     Args:
         min_delay: shortest delay, in seconds.

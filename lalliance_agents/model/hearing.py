@@ -131,7 +131,7 @@ class Hearing:
         return presence is not None and in_window(presence.last, now - self._tau, now, self._closed)
 
     def robots_present(self, now: float) -> list[str]:
-        """The teammates heard within tau; the robot itself is not among them (erratum 3 adds it)."""
+        """robots_present: the teammates heard within tau; the robot itself is not among them (erratum 3 adds it)."""
         return [robot for robot in self.presences if self.is_present(robot, now)]
 
     def silences(self, now: float) -> dict[str, float]:
@@ -148,7 +148,7 @@ class Hearing:
         return [contact for contact in contacts if self.is_on(contact, now)] if contacts else []
 
     def is_on(self, contact: Contact, now: float) -> bool:
-        """comm_received(i, k, j, t - tau, t)."""
+        """comm_received(i, k, j, t - tau, t): whether a teammate was heard on its task within tau."""
         return in_window(contact.last, now - self._tau, now, self._closed)
 
     def anybody_on(self, task: str, now: float) -> bool:
@@ -156,7 +156,7 @@ class Hearing:
         return bool(self.on_task(task, now))
 
     def heard_until(self, contact: Contact, instant: float) -> bool:
-        """comm_received(i, k, j, 0, instant)."""
+        """comm_received(i, k, j, 0, instant): whether it was heard on it by then, in this trial (erratum 16)."""
         return in_window(self.beginning(contact), -math.inf, instant, self._closed)
 
     def is_news(self, contact: Contact, before: float, now: float) -> bool:

@@ -153,29 +153,35 @@ class Parameters(Record):
     architecture: Architecture = Architecture.L_ALLIANCE
     """`l-alliance`, or `alliance`: the same motivations with `by_hand` in the place of everything learned."""
     strategy: StrategyField = Strategy.II
-    """Impatience and acquiescence after Table 1: I, II or III."""
+    """Impatience and acquiescence after Table 1: I goes by the own time alone, II holds each robot to the best one's time,
+    III gives each teammate the time that it needs."""
     ordering: OrderingField = Ordering.DERIVED
-    """Preference among free tasks."""
+    """Which free tasks come first; `derived`: of those that the robot does best the longest, of the others the shortest."""
     threshold: Positive = 1.0
-    """theta: a behaviour set activates when its motivation reaches this value."""
+    """theta: a behaviour set activates when its motivation reaches this value, in motivation. Learned rates are shares of it,
+    so that only the rates set `by_hand` feel a change."""
     broadcast_rate: Positive = 5.0
-    """rho: messages per second that announce the current activity."""
+    """rho: how often a robot announces what it is on, in messages per second. More of them survive losses, and load the bus."""
     silence_timeout: Positive = 1.0
-    """tau: silence after which a teammate is taken to have ceased, in seconds. Must exceed 2/rho."""
+    """tau: silence after which a teammate is taken to have ceased, in seconds. Must exceed 2/rho. A longer one finds failures
+    later, and is deceived less often by lost messages."""
     trials: Annotated[int, Field(ge=1, le=10_000)] = 10
-    """mu: attempts kept per robot and task."""
+    """mu: what a monitor keeps for each robot and task, in attempts. With fewer, what has changed is learned sooner."""
     min_delay: Positive = 0.2
     """Shortest delay before a free task is taken, in seconds."""
     max_delay: Positive = 1.0
-    """Longest delay before a free task is taken, in seconds."""
+    """Longest delay before a free task is taken, in seconds. A longer one keeps the order of preference apart from the chances
+    of messages and steps, and has robots wait; 4 % of a task's time is about right."""
     boredom_threshold: Positive = 1.0
-    """Boredom at which a robot stops leaving tasks to better teammates."""
+    """Boredom at which a robot stops leaving tasks to better teammates. With the default rate it changes nothing."""
     boredom_rate: Positive | None = None
-    """Growth of boredom while no set is active, per second; default: threshold / (1.2 max_delay)."""
+    """Growth of boredom while no set is active, per second; default: boredom_threshold / (1.2 max_delay). A slower one waits
+    longer for better teammates."""
     give_up_factor: Positive = 2.0
-    """lambda as a multiple of the robot's own task time."""
+    """lambda as a multiple of the robot's own task time. With less, stuck robots leave sooner, and slow ones in vain."""
     failure_factor: Positive = 2.0
-    """A failed attempt counts as this multiple of the time spent on it (erratum 13)."""
+    """A failed attempt counts as this multiple of the time spent on it (erratum 13). With more, the robot leaves the task to
+    others for longer."""
     collision_window: NotNegative | None = None
     """Starts closer than this are a collision (erratum 15), in seconds; default: 2/rho."""
     initial_task_time: Positive = 30.0

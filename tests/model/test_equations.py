@@ -5,6 +5,7 @@ import math
 import pytest
 
 from lalliance_agents.model import equations as eq
+from lalliance_agents.model.events import OCCASIONS, REASONS_TO_STOP, Cause
 from lalliance_agents.model.parameters import SLACK, Ordering, Strategy
 
 HALF = SLACK / 2
@@ -240,3 +241,109 @@ def test_motivation_adds_the_increment_and_multiplies_the_factors() -> None:
 def test_each_factor_alone_takes_motivation_to_0(zero: int) -> None:
     factors = [0 if place == zero else 1 for place in range(5)]
     assert eq.motivation(0.5, 0.25, *factors) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("rate", "limit", "at"),
+    [(0.5, 1.0, 2.0 + 2.0), (0.5, 0.0, 2.0), (0.0, 1.0, math.inf), (-1.0, 1.0, math.inf)],  # 0 + 0.5 (t - 2) = limit
+)
+def test_a_ramp_reaches_its_limit_when_it_has_grown_to_it(rate: float, limit: float, at: float) -> None:
+    found = eq.ramp_reaches(0.0, 2.0, rate, limit)
+    assert found == pytest.approx(at)
+    grown = [rate * (instant - 2.0) for instant in (found - TWICE, found + HALF)]
+    assert math.isinf(found) or [eq.reaches(value, limit) for value in grown] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("longest", "floor", "expected"),
+    [(0.0, 0.0, 30.0), (12.0, 0.0, 12.0), (12.0, 20.0, 20.0), (0.0, 20.0, 30.0), (0.0, 40.0, 40.0)],
+)
+def test_an_unknown_time_is_the_longest_known_or_the_initial_one_and_at_least_the_floor(
+    longest: float, floor: float, expected: float
+) -> None:
+    assert eq.presumed_time(longest, 30.0, floor) == expected
+
+
+def test_a_failed_attempt_raises_the_floor_and_never_lowers_it() -> None:
+    assert eq.censored(0.0, 2.0, 7.0) == 14.0  # 2 * 7
+    assert eq.censored(20.0, 2.0, 7.0) == 20.0
+
+
+def test_a_time_is_but_a_bound_while_it_does_not_exceed_the_floor() -> None:
+    assert [eq.is_bound(time, floor) for time, floor in ((14.0, 14.0), (15.0, 14.0), (14.0, 0.0))] == [
+        True,
+        False,
+        False,
+    ]
+
+
+def test_an_attempt_that_did_its_task_at_once_still_leaves_a_time() -> None:
+    assert (eq.credited(3.0, 8.0), eq.credited(3.0, 3.0)) == (5.0, SLACK)
+
+
+@pytest.mark.parametrize(
+    ("elapsed", "trace", "there", "may"),
+    [
+        (0.3, False, False, False),
+        (0.3, False, True, True),  # still heard on the task: it may have done it, however short
+        (0.4, False, False, False),  # the window's end belongs to it
+        (0.4 + TWICE, True, False, True),
+    ],
+)
+def test_an_attempt_within_the_collision_window_leaves_no_trace(
+    elapsed: float, trace: bool, there: bool, may: bool
+) -> None:
+    assert eq.leaves_no_trace(elapsed, 0.4) is not trace
+    assert eq.may_have_done(elapsed, 0.4, there) is may
+
+
+@pytest.mark.parametrize(
+    ("active_for", "now", "same"),
+    [
+        (3.2, 5.2, True),  # 0.2 s after it said 3.0
+        (3.0, 5.2, True),  # delayed, or its clock stood still
+        (2.9, 5.2, False),  # a falling number is a new attempt
+        (3.1, 9.2, False),  # begun at 6.1, when it had been silent for more than tau = 1 since 5.0
+        (3.3, 9.2, True),  # begun at 5.9
+    ],
+)
+def test_a_message_belongs_to_an_attempt_that_it_can_have_begun_in(active_for: float, now: float, same: bool) -> None:
+    assert eq.goes_on(active_for, 3.0, 5.0, now, 1.0) is same
+
+
+@pytest.mark.parametrize(
+    ("own", "theirs", "first", "gives"),
+    [(8.0, 5.0, False, True), (5.0, 8.0, True, False), (5.0, 5.0, True, True), (5.0, 5.0, False, False)],
+)
+def test_the_slower_gives_way_and_between_equals_the_later_name(
+    own: float, theirs: float, first: bool, gives: bool
+) -> None:
+    assert eq.gives_way(own, theirs, first) is gives
+
+
+def test_an_announcement_is_made_by_the_step_nearest_to_its_instant() -> None:
+    steps = [0.0, 0.1, 0.2, 0.3]
+    assert [min(step for step in steps if step >= eq.announces_from(due, 0.1)) for due in (0.04, 0.1, 0.16, 0.24)] == [
+        0.0, 0.1, 0.2, 0.2
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("elsewhere", [True, False])
+def test_a_teammate_is_heard_while_idle_and_on_what_is_shared_and_else_as_the_reading_says(elsewhere: bool) -> None:
+    assert eq.is_heard(True, False, elsewhere)
+    assert eq.is_heard(False, True, elsewhere)
+    assert eq.is_heard(False, False, elsewhere) is elsewhere
+
+
+def test_why_a_task_on_which_somebody_was_heard_can_be_taken() -> None:
+    asked = [(False, True), (True, True), (True, False)]
+    assert [OCCASIONS[eq.occasion(*one)] for one in asked] == [Cause.IMPATIENCE, Cause.RELEASED, Cause.SILENCE]
+
+
+def test_of_several_reasons_to_stop_the_first_counts() -> None:
+    going_on = [False, 1, False, False, False, 1, 1, 1, 1]
+    stopped = [True, 0, True, True, True, 0, 0, 0, 0]
+    assert eq.reason_to_stop(*going_on) == -1
+    for place in range(len(REASONS_TO_STOP)):
+        assert eq.reason_to_stop(*going_on[:place], *stopped[place:]) == place
+        assert eq.reason_to_stop(*going_on[:place], stopped[place], *going_on[place + 1 :]) == place
