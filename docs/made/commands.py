@@ -11,22 +11,22 @@ from mission_control.cli import app
 
 #: What for -> command -> the page that tells more of it.
 GROUPS: dict[str, dict[str, str]] = {
-    "Run a mission": {
+    "run a mission": {
         "run": "missions.md",
         "simulate": "missions.md",
         "check": "missions.md",
         "schema": "missions.md",
     },
-    "Look at it": {
+    "look at it": {
         "why": "watching.md",
         "top": "watching.md",
         "echo": "watching.md",
         "hz": "watching.md",
         "dashboard": "dashboard.md",
     },
-    "Disturb it": {"chaos": "missions.md#faults", "campaign": "campaign.md"},
-    "Record it": {"record": "recording.md", "replay": "recording.md", "bag": "recording.md"},
-    "Deploy it": {
+    "disturb it": {"chaos": "missions.md#faults", "campaign": "campaign.md"},
+    "record it": {"record": "recording.md", "replay": "recording.md", "bag": "recording.md"},
+    "deploy it": {
         "router": "deployment.md",
         "world": "deployment.md",
         "robot": "deployment.md",
@@ -35,7 +35,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "keys": "security.md",
         "deploy": "deployment.md",
     },
-    "Study the method": {"study": "study/README.md"},
+    "study the method": {"study": "study/README.md"},
 }
 
 #: What those pages are called.
@@ -74,7 +74,7 @@ def within(command: Command) -> dict[str, Command]:
 
 
 def overview(folder: str) -> str:
-    """A table of all commands by what they are for.
+    """A table of all commands by what they are for: a line each.
 
     Args:
         folder: the way to the pages, from the page that it stands in.
@@ -82,16 +82,18 @@ def overview(folder: str) -> str:
     Raises:
         ValueError: a command is in no group or in two, or a group names what is no command.
     """
-    commands = tool()
     grouped = [name for group in GROUPS.values() for name in group]
-    if sorted(grouped) != sorted(commands):
-        raise ValueError(f"commands are {sorted(commands)}, grouped are {sorted(grouped)}")
+    if sorted(grouped) != sorted(tool()):
+        raise ValueError(f"commands are {sorted(tool())}, grouped are {sorted(grouped)}")
     rows = [
-        (f"*{purpose}*" if first else "", f"[`lalliance {name}`]({folder}{page})", _first_sentence(commands[name].help or ""))
+        (
+            purpose,
+            ", ".join(f"[`lalliance {name}`]({folder}commands.md#{name})" for name in group),
+            ", ".join(f"[{TITLES[page]}]({folder}{page})" for page in dict.fromkeys(group.values())),
+        )
         for purpose, group in GROUPS.items()
-        for first, (name, page) in zip([True] + [False] * len(group), group.items(), strict=False)
     ]
-    return table(("", "command", "what it does"), rows)
+    return table(("to", "command", "more"), rows)
 
 
 def reference() -> str:
@@ -99,16 +101,12 @@ def reference() -> str:
     commands = tool()
     parts = []
     for purpose, group in GROUPS.items():
-        parts.append(f"## {purpose}\n")
+        parts.append(f"## {purpose.capitalize()}\n")
         for name, page in group.items():
             command = commands[name]
             parts.append(f"### {name}\n\n{_usage(command, name)}\nMore: [{TITLES[page]}]({page}).\n")
             parts.extend(f"#### {name} {sub}\n\n{_usage(one, f'{name} {sub}')}" for sub, one in within(command).items())
     return "\n" + "\n".join(parts)
-
-
-def _first_sentence(help_text: str) -> str:
-    return re.split(r"(?<=\.)\s", " ".join(help_text.split("\n\n", maxsplit=1)[0].split()))[0]
 
 
 def _usage(command: Command, name: str) -> str:

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 #: Page -> name of a part -> what makes it.
 PARTS: dict[str, dict[str, Callable[[], str]]] = {
     "README.md": {"commands": lambda: commands.overview("docs/")},
-    "docs/commands.md": {"overview": lambda: commands.overview(""), "commands": commands.reference},
+    "docs/commands.md": {"commands": commands.reference},
     "docs/missions.md": dict(missions.PARTS),
     "docs/parameters.md": dict(parameters.PARTS),
     "docs/model.md": dict(model.PARTS),

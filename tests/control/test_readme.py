@@ -1,4 +1,4 @@
-"""What the README shows, done as it says."""
+"""What the README and short pages show, done as they say."""
 
 import re
 from collections.abc import Iterator
@@ -6,44 +6,42 @@ from pathlib import Path
 
 import pytest
 import yaml
+from support.documents import ROOT, Shown, blocks, carried_out_by
 from support.processes import MISSIONS, Processes, read_until
-from support.readme import README, blocks, commands
 
 from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.faults import LinkFault, kind_of
 from lalliance_agents.mission_file import parse_mission
 
+README = "README.md"
+EACH = carried_out_by("control/test_readme.py::test_each_block_of_commands_works")
+
 
 @pytest.fixture
 def processes(tmp_path: Path) -> Iterator[Processes]:
     (tmp_path / "missions").symlink_to(MISSIONS)
-    [mission] = blocks("yaml")
-    (tmp_path / "two-rooms.yaml").write_text(mission)
-    [code] = [block for block in blocks("python") if "def behaviors" in block]
+    [mission] = blocks(README, "yaml")
+    for name in ("two-rooms.yaml", "my-mission.yaml"):
+        (tmp_path / name).write_text(mission)
+    [code] = [block for block in blocks(README, "python") if "def behaviors" in block]
     (tmp_path / "my_robot.py").write_text(code)
     with Processes(tmp_path) as tree:
         yield tree
 
 
-TOGETHER = [block for block in blocks("console") if "lalliance router" in block]
-CHAOS = [block for block in blocks("console") if "lalliance chaos" in block]
-KEYS = [block for block in blocks("console") if "lalliance keys" in block]
-RECORDINGS = [block for block in blocks("console") if "lalliance bag" in block]  # see tests/system/test_recording.py
-WATCH = [block for block in blocks("console") if "lalliance why" in block]  # see tests/system/test_watching.py
-BESIDE = TOGETHER + CHAOS + KEYS + RECORDINGS + WATCH
-ALONE = [command for block in blocks("console") if block not in BESIDE for command in commands(block)]
-
-
-@pytest.mark.parametrize("command", ALONE, ids=" ".join)
-def test_each_command_works(processes: Processes, command: list[str]) -> None:
-    done = processes.run(*command)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout
+@pytest.mark.parametrize("block", EACH, ids=lambda block: f"{block.page}: {block.first}".replace("/", "-"))
+def test_each_block_of_commands_works(processes: Processes, block: Shown) -> None:
+    for command in block.commands:
+        done = processes.run(*command)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout
     assert processes.alive() == []
 
 
 def test_a_robot_of_ones_own_performs_and_takes_the_task_over(processes: Processes) -> None:
-    done = processes.run("run", "two-rooms.yaml", "--speed", "2")
+    [block] = carried_out_by("control/test_readme.py::test_a_robot_of_ones_own_performs_and_takes_the_task_over")
+    [command] = block.commands
+    done = processes.run(*command)
     assert done.returncode == 0, done.stderr
     assert "all-rounder takes sweep from broom (silence)" in done.stdout
     assert "mopping, progress 0.0" in done.stdout
@@ -52,9 +50,9 @@ def test_a_robot_of_ones_own_performs_and_takes_the_task_over(processes: Process
 
 def test_the_single_processes_make_a_team(processes: Processes) -> None:
     endpoint = free_endpoint()
-    [block] = TOGETHER
+    [block] = carried_out_by("control/test_readme.py::test_the_single_processes_make_a_team")
     router, world, *robots = [
-        [word.replace("tcp/127.0.0.1:7447", endpoint) for word in command] for command in commands(block)
+        [word.replace("tcp/127.0.0.1:7447", endpoint) for word in command] for command in block.commands
     ]
     running = processes.start(*router)
     read_until(running, "listens")
@@ -70,8 +68,8 @@ def test_the_single_processes_make_a_team(processes: Processes) -> None:
 def test_faults_are_injected_and_healed_while_a_mission_runs(processes: Processes) -> None:
     running = processes.start("run", MISSIONS / "material_handling.yaml", "--plain")
     read_until(running, "pusher starts")
-    [block] = CHAOS
-    said = [processes.chaos(*command[1:]) for command in commands(block)]
+    [block] = carried_out_by("control/test_readme.py::test_faults_are_injected_and_healed_while_a_mission_runs")
+    said = [processes.chaos(*command[1:]) for command in block.commands]
     beginnings = [line.split(":")[0] for line in said]
     assert beginnings[:4] == ["2-hang", "3-link", "4-partition", "Mission material_handling"]
     # On a busy machine those that last a few seconds may be over by now.
@@ -81,15 +79,15 @@ def test_faults_are_injected_and_healed_while_a_mission_runs(processes: Processe
 
 
 def test_a_mission_runs_with_keys(processes: Processes) -> None:
-    [block] = KEYS
-    for command in commands(block):
+    [block] = carried_out_by("control/test_readme.py::test_a_mission_runs_with_keys")
+    for command in block.commands:
         done = processes.run(*command)
         assert done.returncode == 0, done.stderr
     assert "Mission material_handling complete" in done.stdout
 
 
 def test_each_example_of_a_fault_is_one_and_every_kind_has_an_example() -> None:
-    examples = re.findall(r"^\| \w+ \| `(\{.*?\})` \|", README, flags=re.MULTILINE)
+    examples = re.findall(r"^\| \w+ \| `(\{.*?\})` \|", (ROOT / README).read_text(), flags=re.MULTILINE)
     mission = (MISSIONS / "material_handling.yaml").read_text()
     assert {kind_of(parse_mission(planned(mission, one), "m.yaml").faults[0]) for one in examples} == {
         "crash", "hang", "stuck", "slow", "mute", "deaf", "blind", "link", "partition"
@@ -105,4 +103,5 @@ def planned(mission: str, fault: str) -> str:
 def test_every_command_of_the_tool_is_in_the_readme(processes: Processes) -> None:
     listed = re.findall(r"^  (\w+)  ", processes.run("--help").stdout, flags=re.MULTILINE)
     assert len(listed) == 22
-    assert [name for name in listed if f"lalliance {name}" not in README] == []
+    text = (ROOT / README).read_text()
+    assert [name for name in listed if f"lalliance {name}" not in text] == []

@@ -60,7 +60,10 @@ RUN_BY = {
 DONE_ALIKE = {
     "README.md": {"make demo": ".ci/run"},
     # The token is of one start, and the test speaks HTTP itself.
-    "docs/dashboard.md": {'curl -H "Authorization: Bearer $TOKEN"': "dashboard/test_site.py"},
+    "docs/dashboard.md": {
+        'curl -H "Authorization: Bearer $TOKEN" -d \'{"fault": {"kind": "hang", "robot": "pusher"}, "lasts": 3}\' '
+        "http://127.0.0.1:8080/chaos/inject": "dashboard/test_site.py"
+    },
     "docs/deployment.md": {
         # In a docker daemon of its own, with a project's name for each test.
         "docker build -f deploy/Dockerfile -t lalliance .": (

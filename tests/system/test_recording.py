@@ -12,8 +12,8 @@ from typing import Any
 import jsonschema
 import pytest
 from mcap.reader import make_reader
+from support.documents import carried_out_by
 from support.processes import MISSIONS, Processes, read_until, until
-from support.readme import blocks, commands
 
 from lalliance_agents.bus.base import Delivery
 from lalliance_agents.bus.router import free_endpoint, open_router
@@ -35,14 +35,14 @@ KEYS = Keys(DEMO)
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """The folder in which the README's commands were carried out, and the summary of the mission.
+    """The folder in which the documents' commands were carried out, and the summary of the mission.
 
     Whatever uses it is marked `alone`, so that it is made but once.
     """
     folder = tmp_path_factory.mktemp("demo")
     (folder / "missions").symlink_to(MISSIONS)
-    [block] = [block for block in blocks("console") if "lalliance bag" in block]
-    run, *others = commands(block)
+    [block] = carried_out_by("system/test_recording.py::test_nothing_that_the_robots_sent_is_missing")
+    run, *others = block.commands
     with Processes(folder) as processes:
         summary = processes.run_json(*run)
         for command in others:

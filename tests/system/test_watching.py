@@ -3,14 +3,14 @@
 import json
 import os
 import re
-import shlex
 import signal
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
-from support.processes import TESTS, Processes, read_until, until
+from support.documents import carried_out_by
+from support.processes import Processes, read_until, until
 
 #: With the names of the documents; it lasts for as long as it is looked at.
 MISSION = """
@@ -30,14 +30,8 @@ deadline: 9000
 SCREEN_LEFT = "\x1b[?25h\x1b[?1049l"
 
 
-def shown(document: str) -> list[list[str]]:
-    text = (TESTS.parent / document).read_text()
-    lines = re.findall(r"^lalliance ((?:why|echo|hz|top).*)$", text, flags=re.MULTILINE)
-    assert lines
-    return [shlex.split(line) for line in lines]
-
-
-COMMANDS = {" ".join(command): command for document in ("README.md", "docs/watching.md") for command in shown(document)}
+SHOWN = carried_out_by("system/test_watching.py::test_every_command_that_is_shown_works_beside_a_mission")
+COMMANDS = {" ".join(command): command for block in SHOWN for command in block.commands}
 
 
 @pytest.fixture
