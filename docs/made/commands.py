@@ -7,6 +7,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from lalliance_study.markdown import table
+from made.records import plain
 from mission_control.cli import app
 
 #: What for -> command -> the page that tells more of it.
@@ -153,9 +154,5 @@ def _range(bounds: str) -> str:
     """`0.1<=x<=9.0` or `x>=1` in words."""
     found = _BOUNDS.fullmatch(bounds)
     if found is None or not found["most"]:
-        return f"{_plain(bounds.strip('x<>='))} or more"
-    return f"{_plain(found['least'])} to {_plain(found['most'])}"
-
-
-def _plain(number: str) -> str:
-    return f"{float(number):,.0f}" if float(number) >= 1000 else f"{float(number):g}"
+        return f"{plain(float(bounds.strip('x<>=')))} or more"
+    return f"{plain(float(found['least']))} to {plain(float(found['most']))}"

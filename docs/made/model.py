@@ -75,8 +75,8 @@ def appendix() -> str:
         if name not in told:
             raise ValueError(f"the docstring of {place} does not name {name}")
         said = next(part for part in told.split("\n\n") if name in part)
-        rows.append((f"`{greek(name)}`", f"`{place}`", meaning(said), tested(place, tests)))
-    return table(("in the Appendix", "function", "what it says", "tests"), rows)
+        rows.append((f"`{greek(name)}`<br>`{place}`", meaning(said), tested(place, tests)))
+    return table(("in the Appendix, and in the code", "what it says", "tests"), rows)
 
 
 def beyond() -> str:

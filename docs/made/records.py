@@ -1,7 +1,7 @@
 """Tables of the fields of records, from what the records say themselves: names, allowed values, units, defaults, meanings.
 
-The unit of a number stands in its description, as everywhere in the code ("in seconds", "per second"); a number without one
-is an error here, and so is a field without a description.
+The unit of a number stands in its description, as everywhere in the code ("in seconds", "per second"). A number without one is
+an error here if it is not listed as having none, and so is a field without a description.
 """
 
 import json
@@ -41,19 +41,21 @@ RECORDS = {
 HEAD = ("field", "allowed", "unit", "default", "meaning")
 
 #: What a description says of a number -> its unit; the first that is found is taken.
-UNITS = (
-    (r"in motivation per second", "motivation/s"),
-    (r"messages per second", "messages/s"),
-    (r"per second", "1/s"),
-    (r"in motivation\b", "motivation"),
-    (r"\bin seconds|\bin s\b|many seconds|seconds and then", "s"),
-    (r"in attempts", "attempts"),
-    (
-        r"mean length in messages|[Pp]robability|[Ss]hare\b|as a share|multiple|how much longer|logarithm|[Bb]oredom at which",
-        "–",
-    ),
-    (r"How often|comes from this number", "–"),
-)
+UNITS = {
+    r"in motivation per second": "motivation/s",
+    r"in messages per second": "messages/s",
+    r"per second": "1/s",
+    r"in motivation\b": "motivation",
+    r"in seconds|many seconds": "s",
+    r"in attempts": "attempts",
+}
+
+#: Numbers without a unit: counts, shares, factors, and what is drawn from.
+WITHOUT_UNIT = {
+    "Bursts.bad", "Bursts.enter", "Bursts.good", "Bursts.leave", "LinkFault.duplicate", "LinkFault.loss", "LinkFault.reorder",
+    "LogNormal.sigma", "Mission.seed", "Options.noise", "Options.slack", "Parameters.boredom_threshold",
+    "Parameters.failure_factor", "Parameters.give_up_factor", "Phase.trials", "Slow.factor",
+}  # fmt: skip
 
 GREEK = {
     "theta": "θ", "rho": "ρ", "tau": "τ", "mu": "μ", "phi": "φ", "psi": "ψ", "lambda": "λ",
@@ -90,7 +92,7 @@ def _row(place: str, name: str, field: FieldInfo, schema: dict[str, Any], defs: 
         follows, dot, rest = follows.partition(". ")
         rest = f" {rest}" if dot else ""
     told = allowed(schema, defs)
-    unit = unit_of(place, field.description) if re.search(r"number|whole|times", told) else ""
+    unit = unit_of(place, field.description) if "number" in told else ""
     return (
         f"`{name}`",
         told,
@@ -101,15 +103,16 @@ def _row(place: str, name: str, field: FieldInfo, schema: dict[str, Any], defs: 
 
 
 def unit_of(place: str, description: str) -> str:
-    """The unit that a description names.
+    """The unit of the number at `place`, which its description names.
 
     Raises:
-        ValueError: it names none.
+        ValueError: it names none, or one where there should be none.
     """
-    for pattern, unit in UNITS:
-        if re.search(pattern, description.replace("\n", " ")):
-            return unit
-    raise ValueError(f"{place} says nothing of its unit: {description}")
+    said = description.replace("\n", " ")
+    unit = next((unit for pattern, unit in UNITS.items() if re.search(pattern, said)), None)
+    if (unit is None) is not (place in WITHOUT_UNIT):
+        raise ValueError(f"{place} says {'nothing of its unit' if unit is None else f'{unit} and has no unit'}: {said}")
+    return unit or "–"
 
 
 def greek(text: str) -> str:
@@ -178,8 +181,15 @@ def _bounded(kind: str, schema: dict[str, Any]) -> str:
         ("exclusiveMaximum", "<"),
         ("maximum", "≤"),
     )
-    said = [f"{sign} {schema[bound]:g}" for bound, sign in bounds if bound in schema and not schema[bound] >= LARGEST]
+    said = [
+        f"{sign} {plain(schema[bound])}" for bound, sign in bounds if bound in schema and not schema[bound] >= LARGEST
+    ]
     return " ".join([kind, ", ".join(said)]).strip()
+
+
+def plain(number: float) -> str:
+    """A number as people write it."""
+    return f"{number:,.0f}" if number >= 1000 else f"{number:g}"
 
 
 def _list(schema: dict[str, Any], defs: dict[str, Any]) -> str:
