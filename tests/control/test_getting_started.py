@@ -15,7 +15,7 @@ def test_all_of_it_is_as_it_says(tmp_path: Path) -> None:
     mission, fault, robots = blocks(PAGE, "yaml")
     code, test = blocks(PAGE, "python")
     decisions, takeover = blocks(PAGE, "text")
-    path = tmp_path / "greenhouse.yaml"
+    path = tmp_path / "orchard.yaml"
     with Processes(tmp_path) as processes:
 
         def told(commands: list[list[str]]) -> str:
@@ -30,11 +30,11 @@ def test_all_of_it_is_as_it_says(tmp_path: Path) -> None:
         assert takeover in told(again)
         whole = yaml.safe_load(mission + fault) | yaml.safe_load(robots)
         path.write_text(yaml.safe_dump(whole, sort_keys=False))
-        (tmp_path / "gardener.py").write_text(code)
+        (tmp_path / "mower.py").write_text(code)
         said = told(run)
         for line in ("helper takes pick-left from picker (silence)", "valve open", "% watered", "valve closed"):
             assert line in said
-        (tmp_path / "test_greenhouse.py").write_text(test)
+        (tmp_path / "test_orchard.py").write_text(test)
         assert pytest == []
         for options in (["--lalliance-engine", "simulated"], []):
             done = processes.start_module("pytest", "-p", "no:xdist", *options)

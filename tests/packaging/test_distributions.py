@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from support.readme import blocks
+from support.documents import blocks
 
 REPOSITORY = Path(__file__).parents[2]
 CONSTRAINTS = REPOSITORY / "constraints.txt"
@@ -78,7 +78,7 @@ def environment(release: Path, tmp_path_factory: pytest.TempPathFactory) -> Envi
 @pytest.fixture
 def home(tmp_path: Path) -> Path:
     """A folder outside the repository with a mission file."""
-    [mission] = blocks("yaml")
+    [mission] = blocks("README.md", "yaml")
     plain = yaml.safe_load(mission)
     del plain["robots"]["all-rounder"]["behaviors"]
     (tmp_path / "two-rooms.yaml").write_text(yaml.safe_dump(plain))

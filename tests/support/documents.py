@@ -42,9 +42,9 @@ RUN_BY = {
         "lalliance deploy kubernetes missions/material_handling.yaml --out deploy/kubernetes": EACH,
     },
     "docs/getting-started.md": {
-        "lalliance check greenhouse.yaml": STARTED,
-        "lalliance simulate greenhouse.yaml": STARTED,
-        "lalliance run greenhouse.yaml --speed 4": STARTED,
+        "lalliance check orchard.yaml": STARTED,
+        "lalliance simulate orchard.yaml": STARTED,
+        "lalliance run orchard.yaml --speed 4": STARTED,
         "pip install pytest": STARTED,
     },
     "docs/recording.md": {"lalliance run missions/material_handling.yaml --speed 4 --record demo.mcap": RECORDING},
