@@ -7,6 +7,7 @@ import ast
 import re
 import shlex
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
 import typer
@@ -61,8 +62,14 @@ def lines() -> Iterator[tuple[str, str]]:
         yield from ((page, " ".join(line.split())) for line in found if not re.search(r"[…\[]", line))
 
 
+@cache
+def tool() -> TyperGroup:
+    """The commands, which parse what they are given and do nothing."""
+    return without_effect(typer.main.get_group(app))
+
+
 def without_effect(group: TyperGroup) -> TyperGroup:
-    """The same commands, which parse what they are given and do nothing."""
+    """A group of commands that do nothing."""
     for command in group.commands.values():
         if isinstance(command, TyperGroup):
             without_effect(command)
@@ -75,7 +82,7 @@ def parse(line: str) -> None:
     """Raises what is wrong with a line, but for what it leaves out."""
     words = shlex.split(line.partition(" > ")[0], comments=True)[1:]
     try:
-        without_effect(typer.main.get_group(app)).main(words, prog_name="lalliance", standalone_mode=False)
+        tool().main(words, prog_name="lalliance", standalone_mode=False)
     except TyperException as error:
         if type(error).__name__ not in {"MissingParameter", "NoArgsIsHelpError"} and str(error) != "Missing command.":
             raise
