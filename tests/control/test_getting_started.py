@@ -19,9 +19,11 @@ def test_all_of_it_is_as_it_says(tmp_path: Path) -> None:
     with Processes(tmp_path) as processes:
 
         def told(commands: list[list[str]]) -> str:
-            done = [processes.run(*command) for command in commands]
-            assert [one.returncode for one in done] == [0] * len(done), [one.stderr for one in done]
-            return "".join(one.stdout for one in done)
+            """What commands say that run beside one another."""
+            started = [processes.start(*command) for command in commands]
+            said = [one.communicate(timeout=110) for one in started]
+            assert [one.returncode for one in started] == [0] * len(started), said
+            return "".join(out for out, _ in said)
 
         path.write_text(mission)
         said = told(first)
@@ -31,13 +33,16 @@ def test_all_of_it_is_as_it_says(tmp_path: Path) -> None:
         whole = yaml.safe_load(mission + fault) | yaml.safe_load(robots)
         path.write_text(yaml.safe_dump(whole, sort_keys=False))
         (tmp_path / "mower.py").write_text(code)
+        (tmp_path / "test_orchard.py").write_text(test)
+        assert pytest == []
+        tests = [
+            processes.start_module("pytest", "-p", "no:xdist", *options)
+            for options in (["--lalliance-engine", "simulated"], [])
+        ]
         said = told(run)
         for line in ("helper takes pick-left from picker (silence)", "valve open", "% watered", "valve closed"):
             assert line in said
-        (tmp_path / "test_orchard.py").write_text(test)
-        assert pytest == []
-        for options in (["--lalliance-engine", "simulated"], []):
-            done = processes.start_module("pytest", "-p", "no:xdist", *options)
-            out, _ = done.communicate(timeout=110)
-            assert done.returncode == 0, out
+        for one in tests:
+            out, _ = one.communicate(timeout=110)
+            assert one.returncode == 0, out
             assert "1 passed" in out
