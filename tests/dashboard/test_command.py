@@ -1,17 +1,12 @@
-"""`lalliance dashboard` and `run --dashboard`: as the document shows them, and what they say to bad input."""
+"""What `lalliance dashboard` says to bad input."""
 
-import re
-import signal
 import socket
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from urllib.request import urlopen
 
 import pytest
-from support.documents import carried_out_by
-from support.processes import MISSIONS, Processes, read_until
+from support.processes import MISSIONS, Processes
 
 from lalliance_agents.errors import UserError
 from mission_control.dashboard.command import dashboard
@@ -50,30 +45,3 @@ def test_a_mission_does_not_begin_whose_page_has_no_port(processes: Processes) -
     assert len(done.stderr.splitlines()) == 1
     assert "starts" not in done.stdout
     assert processes.alive() == []
-
-
-def test_the_page_is_shown_as_the_document_says(processes: Processes) -> None:
-    """Beside the mission that shows itself, one that runs already is shown, and its recording; each on a free port."""
-    (processes.folder / "missions").symlink_to(MISSIONS)
-    [block] = carried_out_by("dashboard/test_command.py::test_the_page_is_shown_as_the_document_says")
-    run, running, recorded = block.commands
-    mission = processes.start(*run, "--port", "0", "--plain", "--record", "demo.mcap")
-    own = address(mission)
-    read_until(mission, "pusher starts")
-    viewers = [processes.start(*command, "--port", "0") for command in (running, recorded)]
-    for page in (own, *map(address, viewers)):
-        with urlopen(f"{page}/health", timeout=30) as answer:
-            assert answer.status == 200
-        with urlopen(f"{page}/metrics", timeout=30) as answer:
-            assert b"lalliance_mission" in answer.read()
-    for one in (*viewers, mission):
-        one.send_signal(signal.SIGINT)
-        assert one.wait(timeout=30) == 130
-
-
-def address(process: "subprocess.Popen[str]") -> str:
-    """Where a page is, as its process says; without the token."""
-    said = read_until(process, "http://")[-1]
-    found = re.search(r"http://[\d.]+:\d+", said)
-    assert found is not None, said
-    return found[0]

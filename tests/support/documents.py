@@ -17,7 +17,7 @@ WATCHING = "system/test_watching.py::test_every_command_that_is_shown_works_besi
 RECORDING = "system/test_recording.py::test_nothing_that_the_robots_sent_is_missing"
 KEYS = "control/test_readme.py::test_a_mission_runs_with_keys"
 STARTED = "control/test_getting_started.py::test_all_of_it_is_as_it_says"
-PAGE = "dashboard/test_command.py::test_the_page_is_shown_as_the_document_says"
+PAGE = "dashboard/test_shown.py::test_the_page_is_shown_as_the_document_says"
 
 #: Page -> the first line of each block of commands -> the test that carries out its `lalliance` lines.
 RUN_BY = {
