@@ -11,12 +11,12 @@ from support.processes import MISSIONS, Processes, read_until
 
 
 def test_the_page_is_shown_as_the_document_says(tmp_path: Path) -> None:
-    """Beside the mission that shows itself, one that runs already is shown, and its recording; each on a free port."""
+    """Beside the mission that shows itself, slowly, one that runs already is shown, and its recording; each on a free port."""
     (tmp_path / "missions").symlink_to(MISSIONS)
     [block] = carried_out_by("dashboard/test_shown.py::test_the_page_is_shown_as_the_document_says")
     run, running, recorded = block.commands
     with Processes(tmp_path) as processes:
-        mission = processes.start(*run, "--port", "0", "--plain", "--record", "demo.mcap")
+        mission = processes.start(*run, "--port", "0", "--plain", "--record", "demo.mcap", "--speed", "0.5")
         own = address(mission)
         read_until(mission, "pusher starts")
         viewers = [processes.start(*command, "--port", "0") for command in (running, recorded)]
