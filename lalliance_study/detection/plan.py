@@ -155,12 +155,9 @@ def run(out: Path, *, quick: bool, seed: int, jobs: int | None, only: str | None
     Raises:
         UserError: with `only`, the folder's other rows are of another seed or effort, or it has none.
     """
-    wanted = {"seed": seed, "quick": quick}
+    whole, wanted = parts(QUICK if quick else FULL, seed), {"seed": seed, "quick": quick}
     manifest = _manifest_of(out, wanted) if only else _about_this_run() | wanted
-    planned, began = (
-        [part for part in parts(QUICK if quick else FULL, seed) if only in {None, part[0]}],
-        time.monotonic(),
-    )
+    planned, began = [part for part in whole if only in {None, part[0]}], time.monotonic()
     rows: list[Row] = []
     with progress("Failure detection", len(planned)) as advance:
         for found in at_once(work, planned, jobs):
@@ -170,8 +167,9 @@ def run(out: Path, *, quick: bool, seed: int, jobs: int | None, only: str | None
     for kind in KINDS if only is None else (only,):
         _SAVE[kind](out, rows)
     took = {"parts": len(planned), "seconds": round(time.monotonic() - began)}
-    if only is None:
-        (out / MANIFEST).write_text(json.dumps(manifest | took, indent=2) + "\n")
+    # Of a run that renews one kind of rows the manifest says no more than that the parts may have become more.
+    kept = took if only is None else {"parts": len(whole)}
+    (out / MANIFEST).write_text(json.dumps(manifest | kept, indent=2) + "\n")
     return manifest | took
 
 

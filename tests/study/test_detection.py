@@ -197,7 +197,7 @@ def test_rows_of_one_kind_are_renewed_beside_others_of_the_same_run(
         plan.run(tmp_path, quick=True, seed=2, jobs=1, only="react")
     done = plan.run(tmp_path, quick=True, seed=1, jobs=1, only="react")
     after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert {name for name, rows in after.items() if rows != before[name]} == {"reactions.csv"}
+    assert {name for name, rows in after.items() if rows != before[name]} == {"reactions.csv", "manifest.json"}
     assert done["parts"] == len(load(tmp_path / "reactions.csv", Reaction)) == len(FAULTS)
 
 
