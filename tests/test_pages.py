@@ -49,3 +49,13 @@ def test_the_table_of_failures_names_a_test_for_each() -> None:
     ]
     assert len(rows) > 30
     assert [row for row in rows if "`test_" not in row.split("|")[-2]] == []
+
+
+def test_what_the_comparison_says_of_the_study_stands_in_its_report() -> None:
+    page, report = ((ROOT / "docs" / name).read_text() for name in ("comparison.md", "study/report.md"))
+    told = {"CBBA": (1.06, 0.94), "optimum, repaired": (0.88, 0.78), "ALLIANCE, set by hand": (1.43, None)}
+    for who, (kept, anew) in told.items():
+        rows = re.findall(rf"^\| {who} \| ([\d.]+%?)", report, flags=re.MULTILINE)
+        assert rows[0] == f"{kept:.2f}"
+        assert f"{kept:.2f}" in page
+        assert anew is None or (rows[-1] == f"{anew:.2f}" and f"{anew:.2f}" in page)

@@ -80,14 +80,6 @@ def test_a_router_that_is_killed_during_loss_is_back_soon_and_the_mission_comple
 
 
 @pytest.mark.lalliance(engine="real", speed=3)
-def test_a_router_that_dies_too_often_is_told_of(lalliance_mission: Launch, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mission_control.launch.ROUTER_RESTARTS", 0)
-    mission = lalliance_mission(TEAM.removesuffix("faults:\n"))
-    mission.kill_router()
-    mission.wait_for("remark", text="the router ended (killed by SIGKILL), too often to be started again")
-
-
-@pytest.mark.lalliance(engine="real", speed=3)
 def test_a_world_server_that_is_killed_during_loss_is_followed_by_one_that_goes_on(lalliance_mission: Launch) -> None:
     mission = lalliance_mission(TEAM + "  - {at: 0, link: {}, loss: 0.3}\n")
     before = mission.wait_for("complete", task="t4")
