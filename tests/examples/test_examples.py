@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.processes import Processes, read_until, until
+from support.processes import PYTEST_ALONE, Processes, read_until, until
 from support.shown import ROOT, SHOWN, page_with
 
 from lalliance_agents.bus.router import free_endpoint
@@ -23,7 +23,7 @@ def copied(name: str, folder: Path) -> None:
 
 def test_the_greenhouse_passes_its_own_tests(processes: Processes) -> None:
     copied("greenhouse", processes.folder)
-    running = processes.start_module("pytest", "-W", "error", "-p", "no:cacheprovider")
+    running = processes.start_module("pytest", *PYTEST_ALONE)
     out, _ = running.communicate(timeout=110)
     assert running.returncode == 0, out
     assert "4 passed" in out
