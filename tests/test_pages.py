@@ -8,6 +8,7 @@ from typing import get_args
 import pytest
 
 from lalliance_agents.faults import Fault, LinkFault, Partition
+from lalliance_study.detection.tables import reactions
 
 ROOT = Path(__file__).parents[1]
 DOCS = sorted((ROOT / "docs").glob("*.md"))
@@ -59,3 +60,16 @@ def test_what_the_comparison_says_of_the_study_stands_in_its_report() -> None:
         assert rows[0] == f"{kept:.2f}"
         assert f"{kept:.2f}" in page
         assert anew is None or (rows[-1] == f"{anew:.2f}" and f"{anew:.2f}" in page)
+
+
+def test_what_the_table_of_failures_says_of_scenes_stands_in_their_rows() -> None:
+    scenes, _, _ = (ROOT / "docs" / "faults.md").read_text().partition("## What stands around")
+    rows = reactions(ROOT / "docs" / "faults" / "rows")
+    spans = set(
+        re.findall(
+            r"[\d.]+ s \([\d.]+ to [\d.]+\)",
+            scenes.partition("| the whole team")[0] + scenes.partition("## What robots")[2],
+        )
+    )
+    assert len(spans) >= 6
+    assert [span for span in spans if span not in rows] == []
