@@ -249,7 +249,10 @@ class Member:
             self._expect_lapse(instant, now)
 
     def _expect_lapse(self, instant: float, now: float) -> None:
-        if not self._every_step and (step := self._step_from(max(instant, now))) < self._lapse_step:
+        if self._every_step or instant > self._grid.instant(self._lapse_step - 1):
+            return
+        step = self._step_from(max(instant, now))
+        if step < self._lapse_step:
             self._lapse_step = step
             self._schedule()
 
