@@ -1,9 +1,10 @@
 """How many missions a second the kernel runs, beside the exact simulator and a plain loop over control steps.
 
 Each task can be done by 3 robots; mean task 200 control steps, given knowledge, strategy II, derived ordering. The plain loop
-is the simulator made to take every control step of every robot, and every message when it comes. All three run the same
-missions and must find the same makespans. Generation is the time to draw the missions, as a share of the kernel's. The best
-of several runs counts, in CPU time where one thread runs, as whatever else the machine does only slows a run down.
+is the simulator made to take every control step of every robot, and every message when it comes, with an event for each; a
+leaner loop is that of `peers.py`. All three run the same missions and must find the same makespans. Generation is the time to
+draw the missions, as a share of the kernel's. The best of several runs counts, in CPU time where one thread runs, as whatever
+else the machine does only slows a run down.
 
     python benchmarks/kernel.py [--json FILE] [--quick] [--runs N]
 """
