@@ -1,25 +1,20 @@
 """How many missions a second the kernel runs, beside the exact simulator and a plain loop over control steps.
 
 Each task can be done by 3 robots; mean task 200 control steps, given knowledge, strategy II, derived ordering. The plain loop
-is the simulator made to take every control step of every robot, and every message when it comes. All three run the same
-missions and must find the same makespans. Generation is the time to draw the missions, as a share of the kernel's. The best
-of several runs counts, in CPU time where one thread runs, as whatever else the machine does only slows a run down.
+is the simulator made to take every control step of every robot, and every message when it comes, with an event for each; a
+leaner loop is that of `peers.py`. All three run the same missions and must find the same makespans. Generation is the time to
+draw the missions, as a share of the kernel's. The best of several runs counts, in CPU time where one thread runs, as whatever
+else the machine does only slows a run down.
 
-    python benchmarks/kernel.py [--json FILE] [--runs N]
+    python benchmarks/kernel.py [--json FILE] [--quick] [--runs N]
 """
 
-import argparse
-import json
-import platform
 import time
 from collections.abc import Callable
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
+from form import options, publish
 
 from lalliance_agents.model.parameters import Parameters
 from lalliance_study.kernel import RESULTS, run_in_threads, run_missions
@@ -29,6 +24,7 @@ from lalliance_study.simulator import Simulator
 
 #: robots, tasks, missions a run of the kernel, and how many of them the simulator runs
 SHAPES = [(5, 10, 4000, 8), (10, 20, 1500, 4), (20, 40, 500, 2)]
+QUICK = [(5, 10, 400, 2), (10, 20, 150, 1), (20, 40, 50, 1)]
 #: Missions a second that one thread is to run.
 GOALS = {(5, 10): 40_000, (10, 20): 12_000, (20, 40): 3_000}
 
@@ -114,25 +110,22 @@ def compile_time() -> float:
 
 
 def main() -> None:
-    """Print a table and write a JSON file if one is named."""
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--json", type=Path, help="where to write the figures")
-    arguments.add_argument("--runs", type=int, default=10, help="runs of each size; a third as many of the simulator")
+    """Run from the command line."""
+    arguments = options(__doc__)
+    arguments.add_argument(
+        "--runs", type=int, help="runs of each size (default 10; with --quick 2); a third as many of the simulator"
+    )
     chosen = arguments.parse_args()
     compiling = compile_time()
-    rows = [row(*shape, chosen.runs) for shape in SHAPES]
-    table = Table(title="Missions a second, coverage 3", title_justify="left", box=None, pad_edge=False)
-    for heading in COLUMNS:
-        table.add_column(heading, justify="right")
-    for one in rows:
-        table.add_row(*(told(one) for told in COLUMNS.values()))
-    console = Console(width=max(Console().width, 130))
-    console.print(table)
-    console.print(f"Compiling took {compiling:.1f} s.", highlight=False)
-    if chosen.json is not None:
-        machine = {"python": platform.python_version(), "machine": platform.machine(), "numba": version("numba")}
-        figures = {"machine": machine, "compile_seconds": compiling, "kernel": rows}
-        chosen.json.write_text(json.dumps(figures, indent=2) + "\n")
+    shapes, runs = (QUICK, 2) if chosen.quick else (SHAPES, 10)
+    publish(
+        "Missions a second, coverage 3",
+        COLUMNS,
+        [{**row(*shape, chosen.runs or runs), "compile_seconds": compiling} for shape in shapes],
+        path=chosen.json,
+        notes=[f"Compiling took {compiling:.1f} s."],
+        packages=["numba"],
+    )
 
 
 if __name__ == "__main__":

@@ -4,21 +4,16 @@ Each row is one mission, run several times; the fastest run counts, as whatever 
 Beside it the same mission with every control step made and every message taken in, which must give the same event log.
 The goal is 500 times real time for 20 robots and 40 tasks at 10 control steps a second, with three robots able to do each task.
 
-    python benchmarks/simulator.py [--json FILE] [--runs N]
+    python benchmarks/simulator.py [--json FILE] [--quick] [--runs N]
 """
 
-import argparse
-import json
-import platform
 import random
 import sys
 import time
-from importlib.metadata import version
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
+from form import options, publish
 
 from lalliance_agents.config import Mission
 from lalliance_study.simulator import Simulator
@@ -89,54 +84,37 @@ def rows(runs: int) -> list[dict[str, Any]]:
     return found
 
 
+def _own_times(one: dict[str, Any]) -> str:
+    return "{}-{} s".format(*one["own_times"])
+
+
+COLUMNS: dict[str, Callable[[dict[str, Any]], str]] = {
+    "robots": lambda one: f"{one['robots']}",
+    "tasks": lambda one: f"{one['tasks']}",
+    "coverage": lambda one: f"{one['coverage']}",
+    "own times": _own_times,
+    "virtual": lambda one: f"{one['virtual_seconds']:.0f} s",
+    "CPU": lambda one: f"{one['cpu_seconds'] * 1000:.0f} ms",
+    "x real time": lambda one: f"{one['times_real_time']:.0f}",
+    "missions/s": lambda one: f"{one['missions_per_second']:.1f}",
+    "steps made": lambda one: f"{one['steps'] / one['steps_of_all']:.1%}",
+    "gain": lambda one: f"{one['ratio']:.1f}",
+}
+
+
 def main() -> None:
-    """Print a table and write a JSON file if one is named."""
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--json", type=Path, help="where to write the figures")
-    arguments.add_argument("--runs", type=int, default=8, help="runs of each mission")
+    """Run from the command line."""
+    arguments = options(__doc__)
+    arguments.add_argument("--runs", type=int, help="runs of each mission (default 8; with --quick 2)")
     chosen = arguments.parse_args()
-    measured = rows(chosen.runs)
-    table = Table(title="Exact simulator, one core", title_justify="left", box=None, pad_edge=False)
-    for column in (
-        "robots",
-        "tasks",
-        "coverage",
-        "own times",
-        "virtual",
-        "CPU",
-        "x real time",
-        "missions/s",
-        "steps made",
-    ):
-        table.add_column(column, justify="right")
-    table.add_column("gain", justify="right")
-    for row in measured:
-        table.add_row(
-            str(row["robots"]),
-            str(row["tasks"]),
-            str(row["coverage"]),
-            "{}-{} s".format(*row["own_times"]),
-            f"{row['virtual_seconds']:.0f} s",
-            f"{row['cpu_seconds'] * 1000:.0f} ms",
-            f"{row['times_real_time']:.0f}",
-            f"{row['missions_per_second']:.1f}",
-            f"{row['steps'] / row['steps_of_all']:.0%}",
-            f"{row['ratio']:.1f}",
-        )
-    console = Console()
-    console.print(table)
-    for row in measured:
-        if (row["robots"], row["tasks"], row["coverage"]) == (20, 40, 3):
-            share = row["times_real_time"] / GOAL
-            times = "{}-{} s".format(*row["own_times"])
-            console.print(f"20 robots, 40 tasks, coverage 3, own times of {times}: {share:.0%} of the goal of {GOAL} x")
-    if chosen.json is not None:
-        machine = {
-            "python": platform.python_version(),
-            "machine": platform.machine(),
-            "lalliance": version("lalliance"),
-        }
-        chosen.json.write_text(json.dumps({"machine": machine, "simulator": measured}, indent=2) + "\n")
+    measured = rows(chosen.runs or (2 if chosen.quick else 8))
+    notes = [
+        f"20 robots, 40 tasks, coverage 3, own times of {_own_times(one)}: "
+        f"{one['times_real_time'] / GOAL:.0%} of the goal of {GOAL} x"
+        for one in measured
+        if (one["robots"], one["tasks"], one["coverage"]) == (20, 40, 3)
+    ]
+    publish("Exact simulator, one core", COLUMNS, measured, path=chosen.json, notes=notes)
 
 
 if __name__ == "__main__":

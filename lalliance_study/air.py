@@ -190,24 +190,24 @@ class AirLink:
 
     def take(self, now: float, *, each: bool) -> list[Spoken]:
         """What has come until `now` and is fresh: of a row of refreshes the last, or `each` of them."""
-        waiting, taken = self.waiting, []
+        waiting = self.waiting
         if self.settled:
-            if self.speaker.unmade <= now:
-                self.speaker.catch_up(now)
-            latest = self.speaker.latest
+            speaker = self.speaker
+            if speaker.unmade <= now:
+                speaker.catch_up(now)
+            latest = speaker.latest
             if latest is not None and self._is_new(latest):
+                if not waiting:
+                    return [latest] if self._accept(latest) else []
                 waiting.append(latest)
+        taken = []
         last: Spoken | None = None
         while waiting and waiting[0].arrives <= now:
             spoken = waiting.popleft()
             if not self._is_new(spoken):
                 self.stale += 1
                 continue
-            row = 1 if spoken.first is None else spoken.seq - max(self._seq, spoken.first - 1)
-            self._incarnation, self._seq = spoken.incarnation, spoken.seq
-            self.received += row
-            if spoken.trial != self.hearer.trial:
-                self.strange += row
+            if not self._accept(spoken):
                 continue
             if last is not None and (each or last.content is not spoken.content):
                 taken.append(last)
@@ -215,3 +215,13 @@ class AirLink:
         if last is not None:
             taken.append(last)
         return taken
+
+    def _accept(self, spoken: Spoken) -> bool:
+        """Count a message that has come; whether it is of the trial that the hearer is in."""
+        row = 1 if spoken.first is None else spoken.seq - max(self._seq, spoken.first - 1)
+        self._incarnation, self._seq = spoken.incarnation, spoken.seq
+        self.received += row
+        if spoken.trial == self.hearer.trial:
+            return True
+        self.strange += row
+        return False

@@ -83,9 +83,11 @@ class Mishaps:
 
     def look(self, robot: str, now: float) -> None:
         """A body may have turned to something else."""
+        if not self._traps:
+            return
         world = self._world
         body = (world.trial, world.bodies[robot].task)
-        if not self._traps or self._bodies.get(robot) == body:
+        if self._bodies.get(robot) == body:
             return
         self._bodies[robot] = body
         self._attempts[robot] = number = self._attempts.get(robot, 0) + 1

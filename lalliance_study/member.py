@@ -68,8 +68,7 @@ class Member:
     ) -> None:
         self.name = name
         self.tasks = tasks_of(mission, name)
-        self.process = Process.GONE
-        self.there = False
+        self._become(Process.GONE)
         self.incarnation = 0
         self.trial = 0
         self.steps = 0
@@ -112,10 +111,11 @@ class Member:
         assert self._mind is not None  # noqa: S101 - asked only of a robot that was started
         return self._mind
 
-    @property
-    def runs(self) -> bool:
-        """Whether its process runs."""
-        return self.process is Process.RUNNING
+    def _become(self, process: Process) -> None:
+        self.process = process
+        #: Whether its process runs; and whether there is one at all.
+        self.runs = process is Process.RUNNING
+        self.there = process is not Process.GONE
 
     def start(self, now: float) -> None:
         """Begin a new life."""
@@ -123,8 +123,7 @@ class Member:
             self._keep(link)
             link.reset(now)
         self.heeded.clear()
-        self.process = Process.RUNNING
-        self.there = True
+        self._become(Process.RUNNING)
         self.incarnation += 1
         chance = self._circumstances.chance_of(self._mission, self.name, self.incarnation)
         learned = self._circumstances.learned.get(self.name)
@@ -155,8 +154,7 @@ class Member:
         if self.runs:
             self.take_stock(now)
             self._lived += self._periods_here(now)
-        self.process = Process.GONE
-        self.there = False
+        self._become(Process.GONE)
         self.task = None
         self._mind = None
         self._schedule()
@@ -168,7 +166,7 @@ class Member:
             self.voice.unsettle(now)
             for link in self.hears:
                 link.speaker.unsettle(now)
-            self.process = Process.STOPPED
+            self._become(Process.STOPPED)
             self.stopped_at = now
             self.given_up = False
             # The steps before were made, if only in effect.
@@ -179,7 +177,7 @@ class Member:
         """Go on as by SIGCONT; whether the bus had given the robot up meanwhile, and with it all that came."""
         if self.process is not Process.STOPPED:
             return False
-        self.process = Process.RUNNING
+        self._become(Process.RUNNING)
         lost = self.given_up
         for link in self.hears:
             if lost:
@@ -241,7 +239,7 @@ class Member:
     def news(self, link: AirLink, now: float) -> None:
         """A message has come that may be news."""
         if self.runs:
-            self._take(link, now, each=False)
+            self._take([link], now)
             self._heed(now)
             self._expect_lapse(self.mind.next_lapse(self.heeded), now)
 
@@ -251,23 +249,24 @@ class Member:
             self._expect_lapse(instant, now)
 
     def _expect_lapse(self, instant: float, now: float) -> None:
-        if not self._every_step and (step := self._step_from(max(instant, now))) < self._lapse_step:
+        if self._every_step or instant > self._grid.instant(self._lapse_step - 1):
+            return
+        step = self._step_from(max(instant, now))
+        if step < self._lapse_step:
             self._lapse_step = step
             self._schedule()
 
     def _listen(self, now: float, *, each: bool = False, settled: bool = True) -> None:
         """Take in what has come until `now`: of rows of refreshes the last, or `each`; on `settled` links too, or not."""
-        for link in self.hears:
-            if (link.settled and settled) or link.waiting:
-                self._take(link, now, each=each)
+        self._take([link for link in self.hears if link.waiting or (settled and link.settled)], now, each=each)
         self._heed(now)
 
-    def _take(self, link: AirLink, now: float, *, each: bool) -> None:
-        taken = link.take(now, each=each or self._every_step)
-        if taken:
-            mind = self.mind
-            for spoken in taken:
-                mind.handle(spoken.heard, spoken.arrives)
+    def _take(self, links: Iterable[AirLink], now: float, *, each: bool = False) -> None:
+        each = each or self._every_step
+        handle = self.mind.handle
+        for link in links:
+            for spoken in link.take(now, each=each):
+                handle(spoken.heard, spoken.arrives)
 
     def _step_from(self, instant: float) -> int:
         """The first control step that is not before `instant` and still to come."""
@@ -300,7 +299,7 @@ class Member:
             self._lapse_step = self._step_from(mind.next_lapse(self.heeded))
             whole = step >= self._lapse_step or step >= self._wake_step
         if whole or step >= self.voice.due_step:
-            self.voice.prepare(step, now)
+            self.voice.catch_up(now)
             if not self._after_pause:
                 mind.rest(self._grid.instant(step - 1))
             self._after_pause = False

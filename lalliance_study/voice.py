@@ -56,14 +56,16 @@ class Voice:
         self.trial = 0
         self.latest: Spoken | None = None
         self.unmade = math.inf
-        #: Announcements of all lives; and those of them for which no whole control step was made.
-        self.sent = self.beats = 0
+        #: Announcements of all lives.
+        self.sent = 0
         self._delay = delay
         self._rescheduled = rescheduled
         self._settled = False
         self._audience: list[AirLink] = []
         self._content: object = None
         self._beat_step = NEVER
+        #: Whether the control step `_beat_step` was made, and what it announced was not.
+        self._under_way = False
 
     def __repr__(self) -> str:
         return f"<Voice of {self.name}: {self.sent} sent, {'settled' if self._settled else 'heard'}>"
@@ -75,6 +77,7 @@ class Voice:
         self._content = None
         self._seq = 0
         self._beat_step = 0
+        self._under_way = False
         self._due = now
 
     @property
@@ -86,14 +89,10 @@ class Voice:
         """Say nothing before a step."""
         self._beat_step = max(self._beat_step, step)
 
-    def prepare(self, step: int, now: float) -> None:
-        """A control step is about to be made: all that was due before it is said."""
-        self.catch_up(now)
-        if step >= self._beat_step:
-            self.unsettle(now)
-
     def made(self, step: int) -> None:
         """A control step was made, and what it announced was said."""
+        if self._settled:
+            return
         if self._mind.cadence.due != self._due or self._beat_step <= step:
             self._plan(step + 1)
         self._settle()
@@ -105,7 +104,11 @@ class Voice:
         self.trial = self.trial if trial is None else trial
 
     def announce(self, said: Announce, now: float) -> None:
-        """Send an announcement."""
+        """Send an announcement, unless its links are settled: then it is one that is made when somebody looks."""
+        if self._settled:
+            self._mind.cadence.due = self._due
+            self._under_way = True
+            return
         self.sent += 1
         self._seq += 1
         if self._content is None:
@@ -117,7 +120,6 @@ class Voice:
 
     def beat(self, now: float) -> None:
         """Make a control step in which nothing happens but, perhaps, an announcement."""
-        self.beats += 1
         for said in self._mind.beat(now):
             self.announce(said, now)
 
@@ -143,39 +145,41 @@ class Voice:
             link.unsettle(now)
         self._settled = False
         self.latest, self.unmade = None, math.inf
-        under_way = self._beat_step
-        if self._grid.instant(under_way) < now:
-            self._mind.rest(self._grid.instant(under_way - 1))
-            self.beat(self._grid.instant(under_way))
-            self._plan(under_way + 1)
+        instant = self._grid.instant(self._beat_step)
+        if self._under_way or instant < now:
+            self._mind.rest(instant)
+            self._mind.cadence.keep(instant)
+            for said in self._mind.announcement(instant):
+                self.announce(said, instant)
+            self._plan(self._beat_step + 1)
+        self._under_way = False
         self._rescheduled()
 
     def catch_up(self, now: float) -> None:
         """See `air.Speaker`."""
         if now < self.unmade:
             return
-        mind, grid, before, at = self._mind, self._grid, self._seq, 0.0
-        while self.unmade <= now:
-            at = grid.instant(self._beat_step)
-            mind.cadence.keep(at)
-            self._seq += 1
-            self._plan(self._beat_step + 1)
-            self.unmade = grid.instant(self._beat_step) + self._delay
-        self.beats += self._seq - before
-        self.sent += self._seq - before
-        mind.rest(at)
-        for said in mind.announcement(at):
-            self.latest = self._spoken(said, at, self._row)
+        (first, period), cadence, step, made, instant = self._grid, self._mind.cadence, self._beat_step, 0, 0.0
+        comes = first + step * period
+        while comes + self._delay <= now:
+            instant = comes
+            cadence.keep(instant)
+            made += 1
+            step = cadence.next_step(first, period, step + 1)
+            comes = first + step * period
+        self._under_way = False
+        self._beat_step, self._due, self.unmade = step, cadence.due, comes + self._delay
+        self._seq += made
+        self.sent += made
+        self._mind.rest(instant)
+        for said in self._mind.announcement(instant):
+            self.latest = self._spoken(said, instant, self._row)
 
     def _plan(self, step: int) -> None:
         """Find the first step from `step` on at which an announcement is due, if all steps are made."""
-        (first, period), is_due = self._grid, self._mind.cadence.is_due
-        before = first + (step - 1) * period
-        while not is_due(now := first + step * period, before):
-            before = now
-            step += 1
-        self._beat_step = step
-        self._due = self._mind.cadence.due
+        cadence = self._mind.cadence
+        self._beat_step = cadence.next_step(*self._grid, step)
+        self._due = cadence.due
 
     def _spoken(self, said: Announce, now: float, first: int | None = None) -> Spoken:
         heard = Heard(self.name, said.task, said.active_for, said.expected)

@@ -305,6 +305,8 @@ class Launcher:
             arguments = self._plan.router(self._endpoint)
             child = self._router = await Child.start("router", arguments, self._on_line, keeps_output=True)
             await child.read_line()
+        await child.wait()
+        self._view.say(f"the router ended ({child.status}), too often to be started again")
 
     async def _await_end(self) -> dict[str, Any]:
         """The summary of the world server, or an error as soon as nobody is left to complete the mission, or one cannot."""

@@ -166,4 +166,8 @@ def _notes(summary: Mapping[str, Any]) -> Iterator[Text]:
     # A robot that hung has missed its periods whatever the machine.
     hung = any(fault["kind"] == "hang" and fault["fired"] for fault in summary["faults"])
     if control["missed"] > 0.01 * control["periods"] and not hung:
-        yield Text("Many control periods were missed: this machine is too slow for this team at this speed", "yellow")
+        yield Text(
+            "Many control periods were missed: this machine is too slow for this team at this speed, or the code of a "
+            "behaviour set blocks",
+            "yellow",
+        )

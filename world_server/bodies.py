@@ -23,11 +23,6 @@ class Body:
     refreshed: float = -math.inf
     fewest: int = 0
 
-    @property
-    def stops(self) -> float:
-        """When the dead-man switch stops it, in seconds; infinite if it works on nothing."""
-        return math.inf if self.task is None else self.refreshed + DEAD_MAN
-
 
 class Bodies(dict[str, Body]):
     """The bodies of a team, by robot, in the mission's order.
@@ -70,11 +65,11 @@ class Bodies(dict[str, Body]):
 
     def next_stop(self) -> float:
         """When the dead-man switch stops the first body, in seconds; infinite if none works."""
-        return min((body.stops for body in self.values()), default=math.inf)
+        return min([body.refreshed for body in self.values() if body.task is not None], default=math.inf) + DEAD_MAN
 
     def stop_dead(self, now: float) -> bool:
         """Stop the bodies whose action was not refreshed for too long; whether there were any."""
-        dead = [body for body in self.values() if now >= body.stops]
+        dead = [body for body in self.values() if body.task is not None and now >= body.refreshed + DEAD_MAN]
         for body in dead:
             body.task = None
         return bool(dead)

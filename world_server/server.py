@@ -27,6 +27,7 @@ from world_server.environments.base import TaskView
 from world_server.failures import Order
 from world_server.history import MOST_PAST, History
 from world_server.journal import Journal
+from world_server.paces import Paces
 from world_server.world import REFRESH_PERIOD, STEP, Happening
 
 _log = logging.getLogger(__name__)
@@ -96,6 +97,7 @@ class WorldServer:
         self._told_stage: tuple[str, int] | None = None
         self._refresh_due = self._status_due = 0.0
         self._ordered: dict[int, float] = {}
+        self._paces = Paces(speed)
 
     async def run(self) -> dict[str, Any]:
         """Serve until the mission is over; its summary.
@@ -195,6 +197,7 @@ class WorldServer:
         if message.sender not in {LAUNCHER, *self._world.bodies}:
             self._messenger.drop("stranger", message.sender)
             return
+        self._look_at_clock(message)
         match message:
             case DeedDone():
                 self._history.done(message, self._now())
@@ -204,6 +207,18 @@ class WorldServer:
                 self._history.decided(message, self._now())
             case LinkReport():
                 self._history.reported(message, self._now())
+
+    def _look_at_clock(self, message: Message) -> None:
+        """Warn of a robot whose time does not pass as the world's does; while that stands still nothing can be seen."""
+        if self._clock is None or message.sender == LAUNCHER:
+            return
+        pace = self._paces.different(message, self._now())
+        if pace is not None:
+            text = (
+                f"the clock of {message.sender} runs {pace:.3g} times as fast as the world's; "
+                f"expected all processes to be started with the same --speed, {self._speed:g}"
+            )
+            self._tell(Happening("warning", text, self._world.elapsed, message.sender))
 
     def _tell(self, happening: Happening) -> None:
         self._untold.append((self._world.trial, happening))

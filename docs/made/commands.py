@@ -25,7 +25,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "hz": "watching.md",
         "dashboard": "dashboard.md",
     },
-    "disturb it": {"chaos": "missions.md#faults", "campaign": "campaign.md"},
+    "disturb it": {"chaos": "faults.md", "campaign": "campaign.md"},
     "record it": {"record": "recording.md", "replay": "recording.md", "bag": "recording.md"},
     "deploy it": {
         "router": "deployment.md",
@@ -42,7 +42,7 @@ GROUPS: dict[str, dict[str, str]] = {
 #: What those pages are called.
 TITLES = {
     "missions.md": "missions",
-    "missions.md#faults": "faults in a mission file",
+    "faults.md": "faults",
     "watching.md": "watching a mission",
     "dashboard.md": "the web page",
     "campaign.md": "campaigns",

@@ -22,6 +22,14 @@ class Cadence:
         """Whether the step at `now`, after one at `before`, is to announce: it is the first nearest to the instant due."""
         return now >= announces_from(self.due, now - before)
 
+    def next_step(self, first: float, period: float, step: int) -> int:
+        """The first step from `step` on that is to announce, if all steps of a grid are made, which begins at `first`."""
+        due, before = self.due, first + (step - 1) * period
+        while (now := first + step * period) < announces_from(due, now - before):
+            before = now
+            step += 1
+        return step
+
     def keep(self, now: float) -> None:
         """The announcement that was due is made at `now`; the next keeps the rate, unless it would be late already."""
         kept = self.due + self._period

@@ -16,12 +16,17 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from lalliance_agents.errors import UserError
 from lalliance_study.detection.cost import cost
 from lalliance_study.detection.law import Loss
 from lalliance_study.detection.probe import count_suspicions, quantiles, time_detections
 from lalliance_study.detection.reactions import FAULTS, reaction
 from lalliance_study.detection.rows import Cost, Detections, Reaction, Suspicions, save
 from lalliance_study.pool import at_once, progress
+
+#: The kinds of parts, each with rows of its own.
+KINDS = ("listen", "detect", "cost", "react")
+MANIFEST = "manifest.json"
 
 Row: TypeAlias = Suspicions | Detections | Cost | Reaction
 Part: TypeAlias = tuple[str, tuple[Any, ...]]
@@ -137,35 +142,81 @@ def summed(rows: list[Suspicions]) -> Iterator[Suspicions]:
         )
 
 
-def run(out: Path, *, quick: bool, seed: int, jobs: int | None) -> dict[str, Any]:
-    """Measure everything and write rows into `out`; what is said of the run in its manifest."""
-    effort, began = QUICK if quick else FULL, time.monotonic()
-    planned = parts(effort, seed)
+def run(out: Path, *, quick: bool, seed: int, jobs: int | None, only: str | None = None) -> dict[str, Any]:
+    """Measure and write rows into `out`; what is said of the run in its manifest.
+
+    Args:
+        out: the folder of the rows.
+        quick: little of everything.
+        seed: where all that is drawn comes from.
+        jobs: the number of processes; None: one per core.
+        only: the one kind of parts (`KINDS`) whose rows are to be renewed in a folder that has all; None: everything.
+
+    Raises:
+        UserError: with `only`, the folder's other rows are of another seed or effort, or it has none.
+    """
+    whole, wanted = parts(QUICK if quick else FULL, seed), {"seed": seed, "quick": quick}
+    manifest = _manifest_of(out, wanted) if only else _about_this_run() | wanted
+    planned, began = [part for part in whole if only in {None, part[0]}], time.monotonic()
     rows: list[Row] = []
     with progress("Failure detection", len(planned)) as advance:
         for found in at_once(work, planned, jobs):
             rows += found
             advance(1, "")
     out.mkdir(parents=True, exist_ok=True)
-    counted = list(summed([row for row in rows if isinstance(row, Suspicions)]))
+    for kind in KINDS if only is None else (only,):
+        _SAVE[kind](out, rows)
+    took = {"parts": len(planned), "seconds": round(time.monotonic() - began)}
+    # Of a run that renews one kind of rows the manifest says no more than that the parts may have become more.
+    kept = took if only is None else {"parts": len(whole)}
+    (out / MANIFEST).write_text(json.dumps(manifest | kept, indent=2) + "\n")
+    return manifest | took
+
+
+def _about_this_run() -> dict[str, Any]:
+    return {"lalliance": version("lalliance"), "python": platform.python_version(), "machine": platform.machine()}
+
+
+def _manifest_of(out: Path, wanted: dict[str, Any]) -> dict[str, Any]:
+    """What the manifest in `out` says, if it is of a run as `wanted`."""
+    try:
+        manifest: dict[str, Any] = json.loads((out / MANIFEST).read_text())
+    except (OSError, ValueError) as error:
+        raise UserError(f"{out / MANIFEST} cannot be read: {error}; expected rows of all kinds in {out}") from None
+    for name, value in wanted.items():
+        if manifest.get(name) != value:
+            raise UserError(
+                f"the rows in {out} have {name} {manifest.get(name)!r}; expected {value!r} for those beside them"
+            )
+    return manifest
+
+
+def _save_suspicions(out: Path, rows: list[Row]) -> None:
+    counted = summed([row for row in rows if isinstance(row, Suspicions)])
     save(
         out / "suspicions.csv",
         sorted(counted, key=lambda row: (row.burst, row.loss, row.jitter, row.tau_rho)),
         Suspicions,
     )
+
+
+def _save_detections(out: Path, rows: list[Row]) -> None:
     timed = [row for row in rows if isinstance(row, Detections)]
     save(out / "detections.csv", sorted(timed, key=lambda row: (row.burst, row.loss, row.tau_rho)), Detections)
+
+
+def _save_costs(out: Path, rows: list[Row]) -> None:
     save(out / "costs.csv", sorted(row for row in rows if isinstance(row, Cost)), Cost)
+
+
+def _save_reactions(out: Path, rows: list[Row]) -> None:
     taken = [row for row in rows if isinstance(row, Reaction)]
     save(out / "reactions.csv", sorted(taken, key=lambda row: (list(FAULTS).index(row.fault), row.seed)), Reaction)
-    manifest = {
-        "lalliance": version("lalliance"),
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "seed": seed,
-        "quick": quick,
-        "parts": len(planned),
-        "seconds": round(time.monotonic() - began),
-    }
-    (out / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
-    return manifest
+
+
+_SAVE: dict[str, Callable[[Path, list[Row]], None]] = {
+    "listen": _save_suspicions,
+    "detect": _save_detections,
+    "cost": _save_costs,
+    "react": _save_reactions,
+}

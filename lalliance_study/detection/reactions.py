@@ -1,4 +1,4 @@
-"""Each failure of a robot: who notices it, how, and after how long.
+"""Each failure, of a robot or of the radio: who notices it, how, and after how long.
 
 Three robots can do two tasks: the first works on the one that it is best at, the second on the other, the third is free. A
 long task for the second follows, so that there is time for what comes late. Something befalls the first in the middle of its
@@ -26,14 +26,22 @@ TAU_RHO = 5.0
 DEADLINE = 400.0
 
 FAULTS: dict[str, dict[str, Any]] = {
-    "crash": {"kind": "crash"},
-    "hang": {"kind": "hang"},
-    "stuck": {"kind": "stuck"},
-    "slow ×4": {"kind": "slow", "factor": 4.0},
-    "mute": {"kind": "mute"},
-    "deaf": {"kind": "deaf"},
-    "blind": {"kind": "blind"},
+    "crash": {"kind": "crash", "robot": VICTIM},
+    "crash, back after 5 s": {"kind": "crash", "robot": VICTIM, "restart": True},
+    "hang": {"kind": "hang", "robot": VICTIM},
+    "stuck": {"kind": "stuck", "robot": VICTIM},
+    "slow ×4": {"kind": "slow", "factor": 4.0, "robot": VICTIM},
+    "mute": {"kind": "mute", "robot": VICTIM},
+    "deaf": {"kind": "deaf", "robot": VICTIM},
+    "blind": {"kind": "blind", "robot": VICTIM},
+    "loss of 30 %": {"link": {}, "loss": 0.3},
+    "bursts, 30 %": {"link": {}, "loss": {"enter": 3 / 35, "leave": 0.2}},
+    "late by 0.05 to 0.4 s": {"link": {}, "delay": {"uniform": [0.05, 0.4]}},
+    "disorder of 10 %": {"link": {}, "duplicate": 0.1, "reorder": 0.1},
+    "cut from it to a free robot": {"link": {"from": VICTIM, "to": "third"}, "cut": True},
+    "partition from the others": {"partition": [[VICTIM], ["second", "third"]]},
 }
+"""What befalls, and for good but for the crash with a return: the first robot, or what robots hear of one another."""
 
 
 def scene(seed: int, fault: str | None) -> Mission:
@@ -53,7 +61,7 @@ def scene(seed: int, fault: str | None) -> Mission:
                 "broadcast_rate": RATE,
                 "silence_timeout": TAU_RHO / RATE,
             },
-            "faults": [] if fault is None else [FAULTS[fault] | {"robot": VICTIM, "at": at}],
+            "faults": [] if fault is None else [FAULTS[fault] | {"at": at}],
             "deadline": DEADLINE,
             "seed": seed,
         }
@@ -75,7 +83,7 @@ def reaction(seed: int, fault: str) -> Reaction:
     for second in range(1, int(COMES[1]) + 5):
         failing.call_at(float(second), look)
     without, made = healthy.run(), failing.run()
-    [came] = [line.at for line in failing.log if line.what == "fault"]
+    came = next(line.at for line in failing.log if line.what == "fault")
     first = _first_of_its_own(failing.log, healthy.log, came)
     return Reaction(
         fault=fault,

@@ -188,25 +188,24 @@ def reactions(rows: Path) -> str:
         what = "; ".join(
             word if count == len(own) else f"{word} ({count} of {len(own)})" for word, count in words.most_common()
         )
-        spans = [_span([value for value in values if not math.isnan(value)]) for values in (
-            [row.silent for row in own], [row.decided for row in own], [row.delay for row in own]
-        )]  # fmt: skip
+        spans = [
+            _span([value for value in values if not math.isnan(value)], len(own))
+            for values in ([row.silent for row in own], [row.decided for row in own], [row.delay for row in own])
+        ]
         table.append([fault, spans[0], what, spans[1], spans[2]])
     return _markdown(table)
 
 
-def _span(values: Sequence[float]) -> str:
-    """Median, and from the 5th to the 95th percentile."""
+def _span(values: Sequence[float], scenes: int) -> str:
+    """Median, and from the 5th to the 95th percentile; and in how many scenes, if not in all."""
     if len(values) < 2:
         return "never"
     cut = quantiles(values, n=20, method="inclusive")
     if max(map(abs, values)) < 0.005:
         return "0 s"
-    return (
-        f"{cut[9]:.2f} s ({cut[0]:.2f} to {cut[18]:.2f})"
-        if cut[9] < 5
-        else f"{cut[9]:.1f} s ({cut[0]:.1f} to {cut[18]:.1f})"
-    )
+    told = ".2f" if cut[9] < 5 else ".1f"
+    span = f"{cut[9]:{told}} s ({cut[0]:{told}} to {cut[18]:{told}})"
+    return span if len(values) == scenes else f"{span}, in {len(values)} of {scenes}"
 
 
 def costs(rows: Path) -> str:

@@ -33,6 +33,7 @@ class Page:
         shown = [] if keys is None else ["--keys", str(keys)]
         self._arguments = ["dashboard", str(mission), "--port", str(port), "--speed", repr(speed), "--wait", *shown]
         self._child: Child | None = None
+        self._watching: asyncio.Task[None] | None = None
 
     async def open(self, endpoint: str) -> None:
         """Show the mission whose router is at `endpoint`, and say where.
@@ -53,6 +54,12 @@ class Page:
             reason = self._child.last_line.removeprefix("lalliance: ")
             raise UserError(reason or f"the page ended with {self._child.status}")
         self.say(line)
+        self._watching = asyncio.create_task(self._watch(self._child))
+
+    async def _watch(self, child: Child) -> None:
+        """Say it if the page ends: the mission needs it not."""
+        await child.wait()
+        self.say(f"the page ended ({child.status}); `lalliance dashboard` shows the mission again")
 
     def _with(self, endpoint: str) -> Sequence[str]:
         return [*self._arguments, "--connect", endpoint]
@@ -70,5 +77,7 @@ class Page:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the page."""
+        if self._watching is not None:
+            self._watching.cancel()
         if self._child is not None:
             await self._child.end()

@@ -1,8 +1,14 @@
-"""Which robots a run starts at once, when its mission may have come some way before."""
+"""Which processes a run starts: robots, when its mission may have come some way before; a router again, and not for ever."""
+
+from types import SimpleNamespace
+
+import pytest
 
 from lalliance_agents.mission_file import parse_mission
 from lalliance_agents.wire.messages import Action
+from mission_control import launch
 from mission_control.launch import Beginning
+from mission_control.processes import Child
 from world_server.world import World
 
 TEAM = """
@@ -54,3 +60,11 @@ def test_a_mission_that_is_over_needs_no_robot() -> None:
     world.advance(21.0)
     assert world.over
     assert Beginning.of(world).first == ()
+
+
+async def test_a_router_that_dies_too_often_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(launch, "ROUTER_RESTARTS", 0)
+    said: list[str] = []
+    child = await Child.start("router", ["--help"], lambda *_: None)
+    await launch.Launcher._keep_router(SimpleNamespace(_view=SimpleNamespace(say=said.append)), child)
+    assert said == ["the router ended (exit status 2), too often to be started again"]

@@ -1,12 +1,14 @@
-"""What `lalliance dashboard` says to bad input."""
+"""What `lalliance dashboard` says to bad input, and what becomes of a mission without its page."""
 
+import os
+import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from support.processes import MISSIONS, Processes
+from support.processes import MISSIONS, Processes, read_until
 
 from lalliance_agents.errors import UserError
 from mission_control.dashboard.command import dashboard
@@ -45,3 +47,14 @@ def test_a_mission_does_not_begin_whose_page_has_no_port(processes: Processes) -
     assert len(done.stderr.splitlines()) == 1
     assert "starts" not in done.stdout
     assert processes.alive() == []
+
+
+def test_a_mission_goes_on_without_its_page_and_says_so(processes: Processes) -> None:
+    run = processes.start("run", MISSION, "--dashboard", "--port", "0", "--plain", "--speed", "4")
+    read_until(run, "the page of mission material_handling")
+    [page] = processes.alive("dashboard")
+    os.kill(page, signal.SIGKILL)
+    read_until(run, "the page ended (killed by SIGKILL); `lalliance dashboard` shows the mission again")
+    out, _ = run.communicate(timeout=60)
+    assert run.returncode == 0
+    assert "Mission material_handling complete" in out

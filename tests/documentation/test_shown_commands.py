@@ -20,6 +20,7 @@ from mission_control.cli import app
 #: Programs in blocks of commands that others answer for: who.
 OTHERS = {
     ".": "the shell",
+    "cd": "the shell",
     "curl": "dashboard/test_site.py, which speaks HTTP itself",
     "docker": "tests/compose",
     "kubectl": "needs a cluster; control/test_kubernetes.py holds all objects to the schemas of its versions",

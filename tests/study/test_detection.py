@@ -1,5 +1,6 @@
 """Failure detection: the law against counting by hand and against the simulator, and figures and tables from rows."""
 
+import dataclasses
 import itertools
 import math
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lalliance_agents.errors import UserError
 from lalliance_study.detection import plan, tables
 from lalliance_study.detection.cost import cost, doubled
 from lalliance_study.detection.law import (
@@ -19,7 +21,7 @@ from lalliance_study.detection.law import (
     suspicions,
 )
 from lalliance_study.detection.probe import RATE, SPEAKER, count_suspicions, hearer, probe, quantiles, time_detections
-from lalliance_study.detection.reactions import reaction
+from lalliance_study.detection.reactions import FAULTS, reaction
 from lalliance_study.detection.rows import Cost, Detections, Reaction, Suspicions, load, save
 from lalliance_study.logbook import Line
 from lalliance_study.simulator import Simulator
@@ -182,6 +184,21 @@ def small_rows(folder: Path) -> None:
     ]
     save(folder / "costs.csv", costs, Cost)
     save(folder / "reactions.csv", [Reaction("crash", 1, 1.0, 1.1, "teammate", "activate: silence", 2.0)], Reaction)
+
+
+def test_rows_of_one_kind_are_renewed_beside_others_of_the_same_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small_rows(tmp_path)
+    (tmp_path / "manifest.json").write_text('{"seed": 1, "quick": true, "parts": 4294}')
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    monkeypatch.setattr(plan, "QUICK", dataclasses.replace(plan.QUICK, scenes=1))
+    with pytest.raises(UserError, match="have seed 1; expected 2 for those beside them"):
+        plan.run(tmp_path, quick=True, seed=2, jobs=1, only="react")
+    done = plan.run(tmp_path, quick=True, seed=1, jobs=1, only="react")
+    after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert {name for name, rows in after.items() if rows != before[name]} == {"reactions.csv", "manifest.json"}
+    assert done["parts"] == len(load(tmp_path / "reactions.csv", Reaction)) == len(FAULTS)
 
 
 def test_figures_are_drawn_from_rows_and_from_nothing_else(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """The exact simulator: a literal log, the same run for the same seed, and every kind of fault where it belongs."""
 
 import os
+import random
 import subprocess
 import sys
 
@@ -150,6 +151,20 @@ def test_delays_are_explicit() -> None:
     slow_bus = run(PAIR, timing=Timing(message_delay=0.3))
     assert told(slow_bus)[0] != told(run(PAIR))[0]
     assert slow_bus.world.summary()["complete"]
+
+
+def test_whoever_waits_for_what_is_said_next_changes_nothing() -> None:
+    mission, slow_bus = load_mission(MISSIONS / "janitorial.yaml"), Timing(message_delay=0.04)
+    plain = Simulator(mission, timing=slow_bus, every_step=True)
+    summary = plain.run()
+    disturbed = Simulator(mission, timing=slow_bus)
+    chance = random.Random(1)
+    while not disturbed.world.over:
+        disturbed.step()
+        for member in disturbed.members.values():
+            if member.runs and chance.random() < 0.3:
+                member.voice.unsettle(disturbed.now)
+    assert (disturbed.summary(), disturbed.log) == (summary, plain.log)
 
 
 def test_a_mission_that_cannot_complete_ends_at_its_deadline() -> None:

@@ -93,6 +93,16 @@ DONE_ALIKE = {
             "testing/test_documentation.py::test_the_example_runs_in_an_empty_folder"
         )
     },
+    # The examples are copied; their own tests run the mission, real and simulated, and the router listens on a free port.
+    "docs/your-robot.md": {
+        "cd examples/greenhouse": "examples/test_examples.py::test_the_greenhouse_passes_its_own_tests",
+        "lalliance simulate greenhouse.yaml --runs 20": (
+            "examples/test_examples.py::test_the_greenhouse_passes_its_own_tests"
+        ),
+        "lalliance router --listen tcp/127.0.0.1:7447": (
+            "examples/test_examples.py::test_a_watchman_without_a_world_goes_on_where_another_one_died"
+        ),
+    },
     # The mission of the test lasts for as long as it is looked at.
     "docs/watching.md": {"lalliance run missions/material_handling.yaml --record mission.mcap": WATCHING},
 }

@@ -18,6 +18,9 @@ TESTS = Path(__file__).parents[1]
 MISSIONS = TESTS.parent / "missions"
 _MARK = "LALLIANCE_TEST"
 
+#: Options of a pytest as a user has it who installed nothing but lalliance and pytest; and no warning is left unseen.
+PYTEST_ALONE = ("-W", "error", *("-pno:" + plugin for plugin in ("asyncio", "hypothesispytest", "timeout", "xdist")))
+
 
 class Processes:
     """Starts commands, knows all processes that descend from them, and leaves none behind."""

@@ -5,15 +5,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.processes import MISSIONS, Processes
+from support.processes import MISSIONS, PYTEST_ALONE, Processes
 
 from mission_control.watch.happened import KINDS
 
 DOCUMENT = (MISSIONS.parent / "docs" / "testing.md").read_text()
 README = (MISSIONS.parent / "README.md").read_text()
-
-#: What a user who has installed nothing but lalliance and pytest does not have; and no warning is left unseen.
-ALONE = ("-W", "error", *("-pno:" + plugin for plugin in ("asyncio", "hypothesispytest", "timeout", "xdist")))
 
 
 def blocks(text: str) -> list[str]:
@@ -28,7 +25,7 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
 
 def run(processes: Processes, test: str, *options: str) -> str:
     (processes.folder / "test_depot.py").write_text(test)
-    running = processes.start_module("pytest", *ALONE, *options)
+    running = processes.start_module("pytest", *PYTEST_ALONE, *options)
     out, _ = running.communicate(timeout=110)
     assert running.returncode == 0, out
     return out

@@ -271,6 +271,23 @@ async def test_a_second_world_server_of_a_mission_is_refused_and_the_first_goes_
         assert not served.task.done()
 
 
+@pytest.mark.parametrize(("pace", "warned"), [(1.0, False), (1.4, False), (4.0, True), (0.25, True)])
+async def test_a_robot_at_another_speed_is_told_of_once(pace: float, warned: bool) -> None:
+    async with Served() as served:
+        left = served.voices["left"] = Messenger(
+            served.bus, served.keys, "left", 1, lambda: 500.0 + pace * served.loop.time()
+        )
+        await served.appear("left", "right")
+        for _ in range(25):
+            left.send(Kind.ACTION, task=None, trial=1, fewest=0)
+            await asyncio.sleep(1.0)
+    told = [text for text in served.events() if "clock" in text]
+    sentence = (
+        f"the clock of left runs {pace:g} times as fast as the world's; expected all processes to be started with"
+    )
+    assert told == [f"{sentence} the same --speed, 1"] * warned
+
+
 async def test_events_say_for_programs_what_their_text_says_for_people() -> None:
     stuck = PAIR + "faults: [{at: 1, until: 2, robot: left, kind: stuck}]\n"
     async with Served(stuck) as served:

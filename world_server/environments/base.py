@@ -13,7 +13,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from lalliance_agents.config import Mission
 from lalliance_agents.model.parameters import SLACK, Record
@@ -32,8 +32,7 @@ class Work:
             raise ValueError(f"pace {self.pace!r} must be a finite number of 0 or more")
 
 
-@dataclass(frozen=True, slots=True)
-class TaskView:
+class TaskView(NamedTuple):
     """What can be sensed of one task."""
 
     complete: bool

@@ -204,7 +204,7 @@ class TaskPool(EventDriven):
 
     def sense(self) -> dict[str, TaskView]:
         """See `Environment.sense`."""
-        return {task: self._view(task) for task in self._work}
+        return {task: _DONE if task in self._complete else self._view(task) for task in self._work}
 
     @property
     def is_complete(self) -> bool:
@@ -212,8 +212,6 @@ class TaskPool(EventDriven):
         return len(self._complete) == len(self._work)
 
     def _view(self, task: str) -> TaskView:
-        if task in self._complete:
-            return _DONE
         progress = self._work[task].progress(self._crews.get(task, _NOBODY))
         return TaskView(complete=False, applicable=self._is_open(task), progress=progress)
 
@@ -243,7 +241,8 @@ class TaskPool(EventDriven):
     def _attempt(self, robot: str, work: Work) -> Attempt:
         current = self._crews.get(work.task, _NOBODY).get(robot)
         if current is not None:
-            return replace(current, rate=work.pace / current.time)
+            rate = work.pace / current.time
+            return current if rate == current.rate else replace(current, rate=rate)
         number = self._begun.get((robot, work.task), 0) + 1
         time = self._own_times[robot, work.task]
         if self._noise:
