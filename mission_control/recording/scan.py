@@ -1,19 +1,22 @@
 """Reads an MCAP file record by record, up to its last whole one: also a file whose writer was killed, or that was cut.
 
 The library takes files for granted that are whole. So here each record is first seen to be there with all of its bytes, and
-only then given to the library; a chunk must have its checksum too. Where that fails the reading ends and says why. No more than
-one chunk is in memory at a time.
+only then given to the library; a chunk must have its checksum too, and be as long unpacked as it says. Where that fails the
+reading ends and says why. No more than one chunk is in memory at a time.
 """
 
 import io
 import os
 import struct
+import zlib
 from collections.abc import Iterator
 from typing import BinaryIO
 
+import lz4.frame
+import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Chunk, DataEnd, McapRecord, Message
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.stream_reader import StreamReader
 
 MAGIC = b"\x89MCAP0\r\n"
 #: Larger records and chunks are taken for damage, in bytes.
@@ -107,10 +110,7 @@ def _record(content: bytes) -> McapRecord:
 
 def _inside(chunk: Chunk) -> Iterator[McapRecord]:
     """What is in a chunk. The library finds that too, at a twentieth of the speed."""
-    if chunk.uncompressed_size > LARGEST_RECORD:
-        raise ValueError(chunk.uncompressed_size)
-    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-    content = stream.read(size)
+    content = _unpacked(chunk)
     at = 0
     while at < len(content):
         opcode, length = _HEAD.unpack_from(content, at)
@@ -123,3 +123,21 @@ def _inside(chunk: Chunk) -> Iterator[McapRecord]:
         elif opcode in _READ:
             yield _record(content[at:end])
         at = end
+
+
+def _unpacked(chunk: Chunk) -> bytes:
+    """The content of a chunk. The library unpacks whatever there is, and what packs to little can be without end."""
+    size = chunk.uncompressed_size
+    if size > LARGEST_RECORD:
+        raise ValueError(size)
+    if chunk.compression == "zstd":
+        content = zstandard.ZstdDecompressor(max_window_size=LARGEST_RECORD).stream_reader(chunk.data).read(size + 1)
+    elif chunk.compression == "lz4":
+        content = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+    elif chunk.compression:
+        raise ValueError(chunk.compression)
+    else:
+        content = chunk.data
+    if len(content) != size or (chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc):
+        raise ValueError(size)
+    return content

@@ -1,6 +1,7 @@
 """Writes a recording, so that whatever ends the writer, what it was given until a moment ago can be read."""
 
 import contextlib
+import os
 import time
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -69,13 +70,22 @@ class RecordingWriter:
         self._is_broken = False
         self._file = _create(path)
         self._writer = Writer(self._file)
-        installed = version("lalliance")
-        self._writer.start(PROFILE, f"lalliance {installed}; {LIBRARY_IDENTIFIER}")
-        self._writer.add_metadata(ABOUT, About(mission.name, text, mission.seed, installed).metadata())
-        self.flush()
+        try:
+            self._begin(text)
+        except RecordingError as error:
+            self._let_go()
+            path.unlink(missing_ok=True)
+            raise UserError(f"{error}, before its first message; expected room for a recording") from None
 
     def __repr__(self) -> str:
         return f"<recording of {self._mission.name} in {self.path}, {self.written} messages>"
+
+    def _begin(self, text: str) -> None:
+        installed = version("lalliance")
+        self._writer.start(PROFILE, f"lalliance {installed}; {LIBRARY_IDENTIFIER}")
+        about = About(self._mission.name, text, self._mission.seed, installed)
+        self._writer.add_metadata(ABOUT, about.metadata())
+        self.flush()
 
     @property
     def keys(self) -> int:
@@ -144,8 +154,11 @@ class RecordingWriter:
                 self._writer.finish()
                 self._file.flush()
         finally:
-            with contextlib.suppress(OSError):
-                self._file.close()
+            self._let_go()
+
+    def _let_go(self) -> None:
+        with contextlib.suppress(OSError):
+            self._file.close()
 
     def _kind(self, key: str) -> Kind | None:
         found = self._parse(key)
@@ -202,7 +215,7 @@ def check_new(path: Path) -> None:
     Raises:
         UserError: there is.
     """
-    if path.exists():
+    if os.path.lexists(path):
         raise _taken(path)
 
 

@@ -73,7 +73,7 @@ def instant(text: str) -> float:
     minutes, colon, seconds = text.rpartition(":")
     try:
         found = (int(minutes) * 60 if colon else 0) + float(seconds)
-    except ValueError:
+    except (ValueError, OverflowError):
         found = -1.0
     if not 0 <= found < float("inf"):
         raise UserError(

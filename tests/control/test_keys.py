@@ -153,6 +153,11 @@ def test_keys_that_cannot_be_used_are_named_with_the_remedy(keys: Path, case: st
     assert str(caught.value).startswith(sentence.format(r1=keys / "robots/r1"))
 
 
+def test_a_folder_of_keys_with_a_name_that_is_too_long_is_not_there() -> None:
+    with pytest.raises(KeysError, match="no such folder; expected the keys of robot r1"):
+        checked_credentials(Path("x" * 300), "r1")
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file to root")
 @pytest.mark.parametrize(("mode", "usable"), [(0o440, True), (0o640, True), (0o460, False), (0o444, False)])
 def test_root_may_let_a_group_read_a_private_key(

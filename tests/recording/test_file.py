@@ -1,20 +1,26 @@
 """The file: what is written is read, whatever became of the writer and of the file."""
 
 import json
+import tracemalloc
 from pathlib import Path
+from typing import BinaryIO
 
 import jsonschema
+import lz4.frame
 import msgpack
 import pytest
+import zstandard
+from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
+from mcap.records import Chunk
 from mcap.writer import Writer
 from recording.made_up import KEYS, MISSION, TEXT, activity, mixture, seen, small, write
 
 from lalliance_agents.errors import UserError
 from lalliance_agents.wire.keys import Kind
-from mission_control.recording.format import MOST_STRANGE, Ending
+from mission_control.recording.format import ABOUT, MOST_STRANGE, PROFILE, About, Ending
 from mission_control.recording.reader import Recording, information, sightings
-from mission_control.recording.writer import RecordingWriter
+from mission_control.recording.writer import RecordingWriter, check_new
 
 
 def test_what_is_written_is_read_in_the_same_order(tmp_path: Path) -> None:
@@ -129,8 +135,52 @@ def test_nothing_is_overwritten_and_nothing_empty_is_left(tmp_path: Path) -> Non
     assert path.read_text() == "precious"
     with pytest.raises(UserError, match=r"no recording can be written there \(No such file or directory\)"):
         RecordingWriter(tmp_path / "nowhere" / "a.mcap", MISSION, TEXT)
+    with pytest.raises(UserError, match=r"no recording can be written there \(File name too long\)"):
+        check_new(tmp_path / ("x" * 300))
+        RecordingWriter(tmp_path / ("x" * 300), MISSION, TEXT)
     write(tmp_path / "b.mcap", [])
     assert not (tmp_path / "b.mcap").exists()
+
+
+def test_where_there_is_no_room_for_a_recording_no_file_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.mcap"
+
+    def create(path: Path) -> BinaryIO:
+        path.touch()
+        return Path("/dev/full").open("wb")
+
+    monkeypatch.setattr("mission_control.recording.writer._create", create)
+    with pytest.raises(
+        UserError, match=r"No space left on device\); it ends before, before its first message; expected"
+    ):
+        RecordingWriter(path, MISSION, TEXT)
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_chunk_that_unpacks_to_more_than_it_says_is_damage(tmp_path: Path, compression: str) -> None:
+    """Whatever it packs: no more than was said is unpacked."""
+    zeros = bytes(2**27)
+    packed = zstandard.compress(zeros) if compression == "zstd" else lz4.frame.compress(zeros)
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start(PROFILE)
+        writer.add_metadata(ABOUT, About("depot", TEXT, 1, "0").metadata())
+        head = file.tell()
+        writer.finish()
+    builder = RecordBuilder()
+    Chunk(compression, packed, 0, 0, 0, 1000).write(builder)
+    path.write_bytes(path.read_bytes()[:head] + builder.end())
+    tracemalloc.start()
+    recording = Recording(path)
+    assert list(recording) == []
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert recording.broken == f"{path}: it is damaged at byte {head}; all that stands before was read"
+    assert most < 2**22
 
 
 def test_who_makes_up_keys_does_not_fill_the_file(tmp_path: Path) -> None:
