@@ -22,7 +22,7 @@ from mission_control.dashboard.series import Series
 from mission_control.watch.explain import explain
 from mission_control.watch.happened import Happened
 from mission_control.watch.sighting import Sighting
-from mission_control.watch.story import Attempt, RobotSeen, Story
+from mission_control.watch.story import MOST_NAMES, Attempt, RobotSeen, Story
 from mission_control.watch.words import printable
 from world_server.world import TRIAL_PAUSE
 
@@ -39,6 +39,11 @@ CURVES_OF_ONE = (300, 6000)
 FACTORS_OF_ONE = (100, 1500)
 LINKS_OF_ONE = (60, 1500)
 MOST_LINKS = 20_000
+#: Room for the curves of all robots, as much for their factors and for their links, in bytes; and for those of one robot.
+MOST_BYTES = 2**27
+BYTES_OF_ONE = (2**17, 2**24)
+#: Trials told apart, of which the last stands for further ones; and bars that may still change.
+MOST_TRIALS, MOST_UNSETTLED = 4096, 1024
 #: Among how many of the latest things that happened the reason for another one is looked for.
 RECENT = 200
 #: Time between two factors that are kept of one robot, in seconds.
@@ -166,6 +171,8 @@ class Chronicle:
     def place(self, trial: int, elapsed: float) -> float:
         """Where an instant of a trial is on the line of time, in seconds since the first trial began."""
         trial = max(trial, 1)
+        if trial not in self.trials and len(self.trials) >= MOST_TRIALS:
+            trial = next(reversed(self.trials))
         if trial not in self.trials:
             later = [began for number, began in self.trials.items() if number > trial]
             self.trials[trial] = min(later) if later else self.now + TRIAL_PAUSE if self.trials else 0.0
@@ -207,21 +214,25 @@ class Chronicle:
     def _put(self, things: dict[str, Versioned], name: str, value: Any, most: int) -> None:
         thing = things.get(name)
         if thing is None:
-            thing = things[name] = Versioned(Series(most))
+            thing = things[name] = Versioned(Series(most, self._room()))
         if thing.past.change(self.now, value):
             thing.version = self.version
 
     def _note(self, one: Happened) -> None:
-        at = self.place(one.trial or self.story.trial, one.at)
+        trial, next_one = one.trial or self.story.trial, self.story.trial + 1
+        is_made_up = one.made is not None and self.story.status is not None and trial > next_one
+        at = self.place(next_one if is_made_up else trial, one.at)
         self.now = max(self.now, at)
         self._numbers += 1
         self.version += 1
         text = printable(_in_words(one))
         entry = {"id": self._numbers, "from": round(at, 3), "elapsed": round(one.at, 3), "kind": one.kind, "text": text}
         if one.kind == "takeover":
-            self.takeovers[one.cause or "unknown"] += 1
+            self.takeovers[one.cause if one.cause in _TAKEN else "unknown"] += 1
         elif one.kind == "complete" and one.task is not None and one.robot is not None:
             self._done_by[one.task] = (one.trial, one.robot)
+            if len(self._done_by) > MOST_NAMES:
+                del self._done_by[next(iter(self._done_by))]
         elif one.kind in {"fault", "fault_over"}:
             self._note_fault(one, at)
         elif one.kind in {"trial", "trial_over"}:
@@ -264,6 +275,8 @@ class Chronicle:
         while len(self.bars) > MOST_BARS:
             self._unsettled.pop(gone := next(iter(self.bars)), None)
             del self.bars[gone]
+        while len(self._unsettled) > MOST_UNSETTLED:
+            del self._unsettled[next(iter(self._unsettled))]
         for bar in list(self._unsettled.values()):
             self._settle_bar(bar)
 
@@ -320,18 +333,19 @@ class Chronicle:
     def _settle_links(self, name: str, report: LinkReport) -> None:
         self._seen_links[name] = report
         able = self._able or {robot: seen.tasks for robot, seen in self.seen_robots()}
-        lost = self._losses.report(report, able, elsewhere=name not in self._literal)
+        mates = {mate: one for mate, one in report.teammates.items() if mate in self._able or mate in self.story.robots}
+        lost = self._losses.report(name, mates, able, elsewhere=name not in self._literal)
         row = {
             mate: (one.received, _rounded(lost.get(mate)), _rounded(one.silence), one.lost_for is not None)
-            for mate, one in report.teammates.items()
+            for mate, one in mates.items()
         }
-        self._put(self.links, name, row, self._share(MOST_LINKS, LINKS_OF_ONE))
+        self._put(self.links, name, msgpack.packb(row), self._share(MOST_LINKS, LINKS_OF_ONE))
 
     def _settle_motivations(self, name: str, motivations: Motivations) -> None:
         self._seen_motivations[name] = motivations
         if name not in self.curves:
-            self.curves[name] = Series(self._share(MOST_CURVES, CURVES_OF_ONE))
-            self.factors[name] = Series(self._share(MOST_FACTORS, FACTORS_OF_ONE))
+            self.curves[name] = Series(self._share(MOST_CURVES, CURVES_OF_ONE), self._room())
+            self.factors[name] = Series(self._share(MOST_FACTORS, FACTORS_OF_ONE), self._room())
         values = {task: _value(factors.get("motivation")) for task, factors in motivations.sets.items()}
         self.curves[name].add(self.now, msgpack.packb(values))
         # A trial may begin before the instant at which factors are due.
@@ -341,6 +355,10 @@ class Chronicle:
 
     def _share(self, most: int, limits: tuple[int, int]) -> int:
         return min(max(most // max(len(self.story.robots), len(self._able), 1), limits[0]), limits[1])
+
+    def _room(self) -> int:
+        """Room for the past of one robot, in bytes."""
+        return self._share(MOST_BYTES, BYTES_OF_ONE)
 
     def _figures(self) -> dict[str, Any]:
         story, status = self.story, self.story.status

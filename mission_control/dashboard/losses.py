@@ -9,7 +9,7 @@ from collections import Counter, defaultdict, deque
 from collections.abc import Mapping
 
 from lalliance_agents.model.equations import is_heard
-from lalliance_agents.wire.messages import LinkReport
+from lalliance_agents.wire.messages import Reception
 
 #: Reports over which a share is taken; robots make one each second.
 REPORTS = 6
@@ -29,23 +29,24 @@ class Losses:
         self._said[robot][task] += 1
 
     def report(
-        self, report: LinkReport, tasks: Mapping[str, tuple[str, ...]], *, elsewhere: bool
+        self, robot: str, mates: Mapping[str, Reception], tasks: Mapping[str, tuple[str, ...]], *, elsewhere: bool
     ) -> dict[str, float | None]:
         """The share lost of what each teammate said, from 0 to 1; None where too little was said to tell.
 
         Args:
-            report: of the robot that hears.
+            robot: who reports what it has heard.
+            mates: what that was, of each teammate.
             tasks: what each robot can do.
             elsewhere: whether it hears teammates also on tasks that it cannot do (erratum 17).
         """
-        own = frozenset(tasks.get(report.sender, ()))
+        own = frozenset(tasks.get(robot, ()))
         shares: dict[str, float | None] = {}
-        for mate, reception in report.teammates.items():
+        for mate, reception in mates.items():
             audible = 0
             if own.intersection(tasks.get(mate, ())) and mate in self._said:
                 said = self._said[mate].items()
                 audible = sum(count for task, count in said if is_heard(task is None, task in own, elsewhere))
-            shares[mate] = self._share(self._reports[report.sender, mate], audible, reception.received)
+            shares[mate] = self._share(self._reports[robot, mate], audible, reception.received)
         return shares
 
     @staticmethod

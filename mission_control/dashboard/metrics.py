@@ -82,7 +82,7 @@ class MissionMetrics(Collector):
             ((name, mate), one.silence)
             for name, link in links.items()
             for mate, one in link.teammates.items()
-            if one.silence is not None
+            if one.silence is not None and mate in robots
         ]
         if len(robots) <= PAIRS_UP_TO:
             told = "Mission time since the robot last heard the teammate"

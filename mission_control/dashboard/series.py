@@ -5,21 +5,27 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
+#: So few values are kept whatever they weigh.
+FEWEST = 8
+
 
 class Series(Generic[T]):
     """Values, each with the instant from which it holds.
 
-    When more than `most` are kept, the older half is thinned: a value stays if it is some distance later than the one that
+    When there are more than `most`, or those that are bytes are more than `heaviest` of them, the older half is thinned: a value stays if it is some distance later than the one that
     stays before it. The distance grows as the series does, so that the whole time is covered evenly, but for the newest half.
 
     Args:
         most: values to keep, at least 8.
+        heaviest: bytes to keep.
     """
 
-    __slots__ = ("_distance", "_instants", "_most", "_values")
+    __slots__ = ("_distance", "_heaviest", "_instants", "_most", "_values", "_weight")
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int, heaviest: int = 2**24) -> None:
         self._most = most
+        self._heaviest = heaviest
+        self._weight = 0
         self._distance = 0.0
         self._instants: list[float] = []
         self._values: list[T] = []
@@ -39,11 +45,13 @@ class Series(Generic[T]):
         """Add a value that holds from `at` on, in seconds; an instant before the last one counts as that."""
         self._instants.append(max(at, self._instants[-1]) if self._instants else at)
         self._values.append(value)
-        if len(self._values) > self._most:
+        self._weight += _weight(value)
+        if len(self) > self._most or (self._weight > self._heaviest and len(self) > FEWEST):
             self._thin()
+            self._weight = sum(map(_weight, self._values))
 
     def _thin(self) -> None:
-        half = self._most // 2
+        half = len(self) // 2
         # So few that it takes a while until the next time, whatever the instants are.
         room = half // 2
         kept = self._kept(half)
@@ -78,3 +86,7 @@ class Series(Generic[T]):
         """The values that begin to hold after `since` and not after `until`, each with its instant."""
         first, last = bisect_right(self._instants, since), bisect_right(self._instants, until)
         return list(zip(self._instants[first:last], self._values[first:last], strict=True))
+
+
+def _weight(value: object) -> int:
+    return len(value) if isinstance(value, bytes) else 0

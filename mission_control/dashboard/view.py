@@ -70,7 +70,7 @@ class View:
                 "figures": chronicle.figures.past.at(at) or {},
                 "robots": {name: _robot(one.past.at(at)) for name, one in chronicle.robots.items()},
                 "tasks": {name: _task(one.past.at(at)) for name, one in chronicle.tasks.items()},
-                "links": {name: one.past.at(at) or {} for name, one in chronicle.links.items()},
+                "links": {name: _links(one.past.at(at)) for name, one in chronicle.links.items()},
             },
             "curves": self._past_curves(at, robot),
         }
@@ -80,7 +80,7 @@ class View:
         scene: State = {
             "robots": {name: _robot(one.past.last) for name, one in _changed(chronicle.robots, since)},
             "tasks": {name: _task(one.past.last) for name, one in _changed(chronicle.tasks, since)},
-            "links": {name: one.past.last for name, one in _changed(chronicle.links, since)},
+            "links": {name: _links(one.past.last) for name, one in _changed(chronicle.links, since)},
         }
         scene = {name: changed for name, changed in scene.items() if changed}
         if chronicle.figures.version > since:
@@ -139,6 +139,10 @@ def _newer(entries: Any, than: int) -> list[State]:
 
 def _point(one: tuple[float, bytes]) -> tuple[float, Any]:
     return round(one[0], 2), msgpack.unpackb(one[1])
+
+
+def _links(packed: bytes | None) -> State:
+    return {} if packed is None else dict(msgpack.unpackb(packed, use_list=False))
 
 
 def _robot(value: tuple[bool | None, str | None] | None) -> State:

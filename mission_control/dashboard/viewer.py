@@ -6,11 +6,11 @@ is answered. So whoever is slow, or asks too much, costs no more than one messag
 
 import asyncio
 import json
-import math
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from lalliance_agents.wire.messages import LONGEST
 from mission_control.dashboard.view import State, View
 
 #: Least time between two updates, in seconds.
@@ -78,7 +78,10 @@ class Viewer:
 
     async def _listen(self) -> None:
         while True:
-            text = await self._socket.receive_text()
+            came = await self._socket.receive()
+            if came["type"] == "websocket.disconnect":
+                return
+            text = came.get("text") or ""
             try:
                 message = json.loads(text) if len(text) <= LONGEST_MESSAGE else None
             except (ValueError, RecursionError):
@@ -92,7 +95,7 @@ class Viewer:
         robot, at = message.get("robot"), message.get("show")
         if message.get("drawn") == self._number:
             self._drawn.set()
-        if isinstance(at, int | float) and math.isfinite(at):
+        if isinstance(at, int | float) and abs(at) <= LONGEST:
             self._question = float(at), robot if isinstance(robot, str) else ""
             self._asked.set()
         elif isinstance(robot, str):

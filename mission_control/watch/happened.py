@@ -35,6 +35,8 @@ KINDS: dict[str, str] = {
 }
 
 _VERBS = frozenset(Verb)
+#: Letters of a name or a cause that are kept.
+_LONGEST = 64
 #: How a mission ends, in the words of its status.
 _ENDINGS = frozenset({"complete", "failed"})
 #: What the world calls a thing that has two sides: whether it begins or ends.
@@ -106,4 +108,4 @@ def happened_in(told: "Happening | DecisionMade", at: float) -> list[Happened]:
 
 
 def _text(value: object) -> str | None:
-    return None if value is None else str(value)
+    return None if value is None else str(value)[:_LONGEST]

@@ -9,7 +9,7 @@ where one was missed, what the robot announces tells that it is on a task, or id
 """
 
 from collections import Counter, deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from lalliance_agents.errors import MessageError
 from lalliance_agents.model.events import Verb
@@ -35,8 +35,14 @@ from mission_control.watch.sighting import Sighting, read
 #: Kept of what happened, and of attempts: the latest.
 MOST_HAPPENED = 20_000
 MOST_ATTEMPTS = 20_000
-#: Robots and tasks told apart: whoever makes up names cannot fill the memory.
+#: What all that happened may have taken on the bus, in bytes.
+HEAVIEST_HAPPENED = 2**26
+#: Robots, tasks and faults told apart: whoever makes up names cannot fill the memory.
 MOST_NAMES = 1024
+#: Attempts of one robot that may go on at a time.
+MOST_AT_ONCE = 64
+#: How far what a robot says may be ahead of the world's time, in seconds: a fast mission can be ahead of who looks on.
+MOST_AHEAD = 600.0
 
 #: How an attempt ended that no decision ended: the robot's process ended, a new trial began, the mission ended.
 LOST = "lost"
@@ -140,7 +146,7 @@ class Story:
         self.rules: ChaosRules | None = None
         self.robots: dict[str, RobotSeen] = {}
         self.tasks: dict[str, TaskSeen] = {}
-        self.happened: deque[Happened] = deque(maxlen=MOST_HAPPENED)
+        self.happened: deque[Happened] = deque()
         self.attempts: deque[Attempt] = deque(maxlen=MOST_ATTEMPTS)
         self.faults: dict[str, str] = {}
         self.messages: Counter[tuple[str, str]] = Counter()
@@ -148,6 +154,9 @@ class Story:
         self.has_launcher = False
         self._keys = Keys(mission)
         self._freshness = Freshness()
+        #: Of all that happened, in bytes.
+        self._sizes: deque[int] = deque()
+        self._size = 0
         self._lead = 0.0
         self._latest = 0.0
         self._has_world = False
@@ -193,10 +202,10 @@ class Story:
         if isinstance(message, TaskState) and key.task is not None:
             self._task_state(key.task, message)
             return None
-        return self.hear(message, sighting.now)
+        return self.hear(message, sighting.now, len(sighting.payload))
 
-    def hear(self, message: Message, now: float) -> Happened | None:
-        """Go on with a checked, fresh message that came at `now` on the onlooker's clock; what happened by it."""
+    def hear(self, message: Message, now: float, size: int = 0) -> Happened | None:
+        """Go on with a checked, fresh message of `size` bytes that came at `now` on the onlooker's clock; what happened."""
         if message.sender in self.robots:
             seen = self.robots[message.sender]
             seen.heard_at, seen.incarnation = now, message.incarnation
@@ -206,9 +215,9 @@ class Story:
             case ChaosRules():
                 self.rules = message
             case Event():
-                return self._heard_event(of_event(message))
+                return self._heard_event(of_event(message), size)
             case DecisionMade():
-                return self._decided(message, now)
+                return self._decided(message, now, size)
             case _:
                 self._heard_robot(message, now)
         return None
@@ -280,7 +289,7 @@ class Story:
         for task in self.tasks.values():
             task.applicable, task.complete, task.progress, task.completed_at = False, False, 0.0, None
 
-    def _heard_event(self, one: Happened | None) -> Happened | None:
+    def _heard_event(self, one: Happened | None, size: int) -> Happened | None:
         if one is None:
             return None
         self._enter(one.trial, one.at)
@@ -289,6 +298,8 @@ class Story:
             self.faults.clear()
         elif one.kind == "fault":
             self.faults[one.fault or one.text] = one.text.removeprefix("fault: ")
+            if len(self.faults) > MOST_NAMES:
+                del self.faults[next(iter(self.faults))]
         elif one.kind == "fault_over":
             self.faults.pop(one.fault or "", None)
         elif one.kind == "complete" and one.task is not None and (task := self._task(one.task)) is not None:
@@ -297,14 +308,21 @@ class Story:
             self._came_or_went(seen, one.kind == "present", one.at)
         elif one.kind == "end":
             self._end_all(OVER)
-        return self._note(one)
+        return self._note(one, size)
 
-    def _note(self, one: Happened) -> Happened:
+    def _note(self, one: Happened, size: int = 0) -> Happened:
         self.happened.append(one)
+        self._sizes.append(size)
+        self._size += size
+        while len(self.happened) > MOST_HAPPENED or self._size > HEAVIEST_HAPPENED:
+            self.happened.popleft()
+            self._size -= self._sizes.popleft()
         return one
 
-    def _decided(self, made: DecisionMade, now: float) -> Happened | None:
+    def _decided(self, made: DecisionMade, now: float, size: int) -> Happened | None:
         one = of_decision(made, self.elapsed(now))
+        if self.status is not None and made.trial == self.trial and one.at > self.elapsed(now) + MOST_AHEAD:
+            one = replace(one, at=self.elapsed(now))
         seen = self._robot(made.sender)
         if seen is not None and (threshold := _number(made.terms.get("threshold"))) > 0:
             seen.threshold = threshold
@@ -316,7 +334,7 @@ class Story:
                 self._end(seen, seen.attempts[made.task], one.at, made.cause)
             elif seen.last is not None and seen.last.task == made.task and seen.last.ended is None:
                 seen.last.until, seen.last.ended = one.at, made.cause
-        return self._note(one)
+        return self._note(one, size)
 
     def _heard_robot(self, message: Message, now: float) -> None:
         # The world speaks of bodies too, and is none.
@@ -325,7 +343,7 @@ class Story:
             return
         match message:
             case Hello():
-                seen.tasks = tuple(message.tasks)
+                seen.tasks = tuple(message.tasks[:MOST_NAMES])
             case Motivations():
                 seen.motivations = message
             case LinkReport():
@@ -342,6 +360,8 @@ class Story:
         """The attempt that goes on of this robot at this task, begun if there is none."""
         attempt = seen.attempts.get(task)
         if attempt is None:
+            if len(seen.attempts) >= MOST_AT_ONCE:
+                self._end(seen, next(iter(seen.attempts.values())), at, None)
             attempt = seen.attempts[task] = Attempt(seen.name, task, self.trial, at)
             self.attempts.append(attempt)
         return attempt

@@ -3,10 +3,11 @@
 import itertools
 from typing import Any
 
+import pytest
 from support.telling import Telling
 
 from lalliance_agents.wire.keys import Kind
-from mission_control.dashboard.series import Series
+from mission_control.dashboard.series import FEWEST, Series
 from mission_control.dashboard.view import View
 
 
@@ -115,6 +116,39 @@ def test_what_was_lost_on_the_way_is_told_of_each_pair() -> None:
     assert (received, silence, silent) == (56, 0.1, False)
     assert lost is not None
     assert abs(lost - 0.3) < 0.03
+
+
+def test_whoever_makes_things_up_gets_little_room_and_does_not_move_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mission_control.dashboard.chronicle.MOST_TRIALS", 20)
+    telling = Telling()
+    chronicle = telling.chronicle
+    telling.takeover()
+    for number in range(70):
+        details = {"cause": f"cause-{number}", "from": "right"}
+        telling.event("takeover", "made up", 6.0, robot="left", task="a", details=details)
+        telling.event("complete", "made up", 6.0, robot="left", task=f"task-{number}", trial=number + 1)
+    assert chronicle.takeovers == {"silence": 1, "unknown": 70}
+    assert len(chronicle.trials) == 20
+    telling = Telling()
+    chronicle = telling.chronicle
+    telling.takeover()
+    made = {"verb": "activate", "task": "b", "cause": "free", "other": None, "active_for": 0.0, "factors": {}}
+    telling.say(Kind.DECISION, 6.1, by="left", **made, trial=1, elapsed=1e12, teammates=[])
+    telling.say(Kind.DECISION, 6.2, by="left", **made, trial=10**9, elapsed=2.0, teammates=[])
+    telling.link(6.3, by="right", **{f"ghost-{number}": {"received": 7} for number in range(2000)})
+    telling.status(6.5)
+    assert chronicle.now < 20
+    assert list(chronicle.trials) == [1, 2]
+    assert View(chronicle).update()["scene"]["links"] == {"right": {}}
+
+
+def test_a_series_of_bytes_has_little_room_for_large_ones() -> None:
+    series: Series[bytes] = Series(100, 1000)
+    for number in range(500):
+        series.add(float(number), bytes(10 if number < 50 else 200))
+    assert len(series) <= FEWEST
+    assert series.at(499.0) == bytes(200)
+    assert series.at(0.0) == bytes(10)
 
 
 def test_a_series_keeps_the_whole_time_in_little_room() -> None:

@@ -7,7 +7,7 @@ import pytest
 from lalliance_agents.wire.keys import LAUNCHER, WORLD, Keys, Kind
 from lalliance_agents.wire.messages import BODY_OF, DecisionMade, encode
 from mission_control.watch.sighting import Sighting
-from mission_control.watch.story import Story
+from mission_control.watch.story import HEAVIEST_HAPPENED, MOST_AT_ONCE, MOST_NAMES, Story
 from mission_control.watch.words import describe, printable
 
 KEYS = Keys("m")
@@ -163,3 +163,28 @@ def test_without_a_world_robots_say_which_trial_it_is_and_presence_tells_who_wen
     gone = bus.story.take(Sighting(0, 4.0, alive, b"", gone=True))
     assert str(gone) == "    4.0 s  left is gone"
     assert bus.bars() == [("left", "a", 1, 2.0, None, 4.0, "lost")]
+
+
+def test_whoever_makes_things_up_gets_little_room() -> None:
+    bus = Bus()
+    for number in range(MOST_NAMES + 50):
+        bus.event("fault", "fault: made up", 1.0, details={"name": f"{number}-{'x' * 100}", "begins": True})
+        bus.say(Kind.ACTIVITY, 2.0, by="ghost", task=f"task-{number}", trial=1, active_for=0.0, expected=1.0)
+    assert len(bus.story.faults) == MOST_NAMES
+    assert max(map(len, bus.story.faults)) <= 64
+    assert len(bus.story.robots["ghost"].attempts) == MOST_AT_ONCE
+    bus.say(Kind.HELLO, 3.0, by="ghost", tasks=[f"task-{number}" for number in range(MOST_NAMES + 50)])
+    assert len(bus.story.robots["ghost"].tasks) == MOST_NAMES
+    for number in range(600):
+        bus.decide("activate", "free", 4.0, factors={"boast": "x" * 150_000}, elapsed=float(number))
+    assert 400 < len(bus.story.happened) <= HEAVIEST_HAPPENED // 150_000
+    assert bus.story.happened[-1].at == 599.0
+
+
+def test_a_robot_that_is_far_ahead_of_the_world_is_not_believed() -> None:
+    bus = Bus()
+    bus.status(10.0, elapsed=5.0)
+    bus.decide("activate", "free", 11.0, elapsed=1e12)
+    assert bus.story.happened[-1].at == 6.0
+    bus.decide("activate", "free", 12.0, elapsed=300.0)
+    assert bus.story.happened[-1].at == 300.0
