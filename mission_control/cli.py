@@ -251,9 +251,9 @@ def _page(path: Path, port: int, keys: Path | None, speed: float) -> "Page":
 
 
 def _view(mission: "Mission", console: "Console", *, plain: bool) -> "Lines":
-    from mission_control.live import Lines, LiveView
+    from mission_control.live import Lines, LiveView, can_redraw
 
-    return LiveView(mission, console) if console.is_terminal and not plain else Lines(mission.name, console)
+    return LiveView(mission, console) if can_redraw(console) and not plain else Lines(mission.name, console)
 
 
 def _fail(text: str, status: int) -> NoReturn:

@@ -24,6 +24,11 @@ def bar(share: float, width: int = _BAR) -> str:
     return "█" * filled + "░" * (width - filled)
 
 
+def can_redraw(console: Console) -> bool:
+    """Whether what was drawn can be drawn over: a terminal can, unless it is one that only prints (TERM=dumb)."""
+    return console.is_terminal and not console.is_dumb_terminal
+
+
 class Lines:
     """A view for where there is no terminal: each event as a line.
 

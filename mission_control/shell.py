@@ -1,6 +1,8 @@
 """What the commands have in common: how their arguments are called, and how work is ended from outside."""
 
 import asyncio
+import os
+import select
 import signal
 from collections.abc import Coroutine
 from pathlib import Path
@@ -49,6 +51,9 @@ JournalPath = Annotated[
 ]
 
 T = TypeVar("T")
+
+#: How long the event loop may take to notice that it is to end before it is looked whether it can, in seconds.
+STUCK = 1.0
 
 
 def endpoint_of(given: str | None, keys: Path | None) -> str:
@@ -109,7 +114,7 @@ def end_when_told() -> None:
 
 
 def run_until_told(work: Coroutine[Any, Any, T]) -> T:
-    """Run `work`; SIGINT and SIGTERM cancel it.
+    """Run `work`; SIGINT and SIGTERM cancel it, also where it waits for somebody to read what it prints.
 
     Raises:
         ToldToEnd: one of them came.
@@ -121,11 +126,19 @@ def run_until_told(work: Coroutine[Any, Any, T]) -> T:
         loop = asyncio.get_running_loop()
 
         def stop(number: int) -> None:
+            signal.setitimer(signal.ITIMER_REAL, 0)
             told.append(number)
             task.cancel()
 
+        def tell(number: int, _frame: object) -> None:
+            if loop.is_closed():
+                raise ToldToEnd(number)
+            signal.signal(signal.SIGALRM, lambda *_: _look_whether_stuck(number))
+            signal.setitimer(signal.ITIMER_REAL, STUCK)
+            loop.call_soon_threadsafe(stop, number)
+
         for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, stop, number)
+            signal.signal(number, tell)
         return await task
 
     try:
@@ -133,7 +146,31 @@ def run_until_told(work: Coroutine[Any, Any, T]) -> T:
     except asyncio.CancelledError:
         raise ToldToEnd(told[0] if told else signal.SIGTERM) from None
     finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
         end_when_told()
+
+
+def _look_whether_stuck(number: int) -> None:
+    """Go on with ending a process whose event loop has not come to it for a moment.
+
+    Raises:
+        ToldToEnd: nobody reads what it prints.
+    """
+    stuck = [stream for stream in (1, 2) if _is_full(stream)]
+    if not stuck:  # it is only busy
+        signal.setitimer(signal.ITIMER_REAL, STUCK)
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in stuck:
+        os.dup2(nowhere, stream)
+    raise ToldToEnd(number)
+
+
+def _is_full(descriptor: int) -> bool:
+    try:
+        return not select.select([], [descriptor], [], 0)[1]
+    except (OSError, ValueError):  # it is closed
+        return False
 
 
 def load_part(path: Path, seed: int | None, *, part: Literal["team", "world", "robot"]) -> "Mission":

@@ -12,7 +12,7 @@ from mission_control.watch.sighting import Sighting
 
 #: How often the chronicle is brought up to date, in real seconds; of a recording, in mission seconds.
 SETTLE_PERIOD = 0.2
-#: Sightings that are taken before others have their turn.
+#: Sightings of a recording that are taken before others have their turn.
 AT_ONCE = 100
 #: A mission that runs is heard more often than this, in real seconds.
 SILENCE = 5.0
@@ -67,12 +67,8 @@ class LiveFeed:
                 await asyncio.gather(*work, return_exceptions=True)
 
     async def _take(self) -> None:
-        count = 0
         async for sighting in self._onlooker:
             self._chronicle.take(sighting)
-            count += 1
-            if count % AT_ONCE == 0:
-                await asyncio.sleep(0)
 
     async def _settle(self) -> None:
         while True:

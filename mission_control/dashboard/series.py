@@ -12,8 +12,9 @@ FEWEST = 8
 class Series(Generic[T]):
     """Values, each with the instant from which it holds.
 
-    When there are more than `most`, or those that are bytes are more than `heaviest` of them, the older half is thinned: a value stays if it is some distance later than the one that
-    stays before it. The distance grows as the series does, so that the whole time is covered evenly, but for the newest half.
+    When there are more than `most`, or those that are bytes are more than `heaviest` of them, the older half is thinned: a
+    value stays if it is some distance later than the one that stays before it. The distance grows as the series does, so that
+    the whole time is covered evenly, but for the newest half.
 
     Args:
         most: values to keep, at least 8.

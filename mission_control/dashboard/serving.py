@@ -8,12 +8,17 @@ from collections.abc import AsyncIterator, Iterator
 
 import uvicorn
 from starlette.types import ASGIApp
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from lalliance_agents.errors import UserError
 from mission_control.dashboard.viewer import LONGEST_MESSAGE
 
 #: How long connections may take to end when the server does, in seconds.
 GRACE = 1
+#: How long a connection may last that is no viewer's, in seconds: whoever says nothing, or very slowly, is not waited for.
+LONGEST_CONNECTION = 30.0
+#: Such connections at a time; the oldest makes room for the newest.
+MOST_CONNECTIONS = 128
 
 
 class _Server(uvicorn.Server):
@@ -21,6 +26,28 @@ class _Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         """Leave signals to the command."""
         yield
+
+
+class _Brief(H11Protocol):
+    """A connection until it is a viewer's, which has a protocol of its own."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override] # as in its base
+        """Begin, as others end."""
+        super().connection_made(transport)
+        self.began = self.loop.time()
+        others = [one for one in self.connections if isinstance(one, _Brief)]
+        if len(others) > MOST_CONNECTIONS:
+            min(others, key=lambda one: one.began).transport.abort()
+        self.ending = self.loop.call_later(LONGEST_CONNECTION, self._end)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End."""
+        self.ending.cancel()
+        super().connection_lost(exc)
+
+    def _end(self) -> None:
+        if self in self.connections:
+            self.transport.abort()
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -59,6 +86,7 @@ async def served(app: ASGIApp, listening: socket.socket) -> AsyncIterator[None]:
         access_log=False,
         server_header=False,
         proxy_headers=False,
+        http=_Brief,
         ws="websockets-sansio",
         ws_max_size=4 * LONGEST_MESSAGE,
         ws_per_message_deflate=False,

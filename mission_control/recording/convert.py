@@ -198,5 +198,6 @@ def _new_file(path: Path) -> Iterator[BinaryIO]:
     try:
         with written_whole(path) as file:
             yield file
+            check_new(path)  # to convert takes a while
     except OSError as error:
         raise UserError(f"{path}: cannot be written ({error.strerror}); expected a place for a new file") from None

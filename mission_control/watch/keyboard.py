@@ -1,12 +1,17 @@
-"""Single keys pressed on the terminal, by name."""
+"""Single keys pressed on the terminal, by name.
+
+Who stops this process with Ctrl-Z gets the terminal as it was, and gives it back as this process had it.
+"""
 
 import asyncio
 import contextlib
 import os
+import signal
 import sys
 import termios
 import tty
 from collections.abc import Callable, Iterator
+from typing import Any
 
 _NAMES = {
     b"\x1b[A": "up",
@@ -35,10 +40,11 @@ def names(pressed: bytes) -> Iterator[str]:
 
 
 @contextlib.contextmanager
-def keyboard(pressed: Callable[[str], None]) -> Iterator[bool]:
+def keyboard(pressed: Callable[[str], None], show: Callable[[bool], None] = lambda _: None) -> Iterator[bool]:
     """Have `pressed` called in the event loop with each key; whether any can come.
 
-    They come from a terminal, if this process has it, or from a pipe.
+    They come from a terminal, if this process has it, or from a pipe. `show` is called with False before this process is
+    stopped from the terminal, and with True when it has it again.
     """
     try:
         descriptor = sys.stdin.fileno()
@@ -56,7 +62,7 @@ def keyboard(pressed: Callable[[str], None]) -> Iterator[bool]:
         for name in names(came):
             pressed(name)
 
-    with _unbuffered(descriptor) as is_ours:
+    with _unbuffered(descriptor, show) as is_ours:
         can_come = is_ours
         try:
             if is_ours:
@@ -70,18 +76,56 @@ def keyboard(pressed: Callable[[str], None]) -> Iterator[bool]:
 
 
 @contextlib.contextmanager
-def _unbuffered(descriptor: int) -> Iterator[bool]:
+def _unbuffered(descriptor: int, show: Callable[[bool], None]) -> Iterator[bool]:
     """Have a terminal hand out each letter at once and show none; whether it is for this process to say."""
     if not os.isatty(descriptor):
         yield True
         return
-    with contextlib.suppress(OSError):  # a terminal of another session, which nobody here is in the background of
-        if os.tcgetpgrp(descriptor) != os.getpgrp():  # in the background, where a terminal stops who changes it
-            yield False
-            return
+    if _is_in_background(descriptor):
+        yield False
+        return
     before = termios.tcgetattr(descriptor)
     tty.setcbreak(descriptor)
     try:
-        yield True
+        with _stoppable(descriptor, before, show):
+            yield True
     finally:
+        if not _is_in_background(descriptor):
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+
+def _is_in_background(descriptor: int) -> bool:
+    """Whether others have the terminal, which stops who changes it in the background."""
+    with contextlib.suppress(OSError):  # a terminal of another session, which nobody here is in the background of
+        return os.tcgetpgrp(descriptor) != os.getpgrp()
+    return False
+
+
+@contextlib.contextmanager
+def _stoppable(descriptor: int, before: list[Any], show: Callable[[bool], None]) -> Iterator[None]:
+    """Give the terminal back as it was `before` when it stops this process, and take it again afterwards."""
+    loop = asyncio.get_running_loop()
+
+    def go_on() -> None:
+        with contextlib.suppress(termios.error):  # the terminal is gone
+            tty.setcbreak(descriptor)  # in the background, here it stands still again
+        show(True)
+
+    def stop() -> None:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        show(False)
+        loop.remove_signal_handler(signal.SIGTSTP)
+        os.kill(os.getpid(), signal.SIGTSTP)  # here it stands still, unless nobody could have it go on
+        loop.add_signal_handler(signal.SIGTSTP, stop)
+        go_on()
+
+    if signal.getsignal(signal.SIGTSTP) is not signal.SIG_DFL:  # it is not to be stopped
+        yield
+        return
+    loop.add_signal_handler(signal.SIGTSTP, stop)
+    loop.add_signal_handler(signal.SIGCONT, go_on)
+    try:
+        yield
+    finally:
+        loop.remove_signal_handler(signal.SIGTSTP)
+        loop.remove_signal_handler(signal.SIGCONT)

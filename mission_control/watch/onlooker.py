@@ -2,7 +2,8 @@
 
 It first asks for what there is already: last values, and what the world remembers of decisions and events. What has come
 meanwhile follows after. What its reader does not fetch in time waits in a bounded queue; when that is full the oldest
-message is dropped and counted, but never a presence, as one that was lost would stay wrong for ever.
+message is dropped and counted, but never a presence, as one that was lost would stay wrong for ever. However much waits,
+others in the event loop have their turn, above all who is to end it.
 """
 
 import asyncio
@@ -25,6 +26,10 @@ from mission_control.watch.story import Story
 
 #: Sightings that may wait to be fetched.
 CAPACITY = 20_000
+#: What they may hold altogether, in bytes.
+HEAVIEST = 2**26
+#: How long sightings are handed on before others have their turn, in real seconds.
+TURN = 0.02
 #: How long to wait at the start for answers about what there is already, in real seconds.
 GREETING_TIMEOUT = 1.0
 #: How long to wait for what is said again and again, in real seconds.
@@ -81,6 +86,9 @@ class Onlooker:
         self._asks = asks
         self._capacity = capacity
         self._waiting: deque[Sighting] = deque()
+        self._size = 0
+        self._loop = asyncio.get_running_loop()
+        self._turn_ends = self._loop.time()
         # Presences that reached the old end of a full queue: older than all that waits.
         self._rescued: deque[Sighting] = deque()
         self._news = asyncio.Event()
@@ -117,6 +125,7 @@ class Onlooker:
         answers = [sample for found in await asyncio.gather(*asked) for sample in found]
         early = list(self._waiting)
         self._waiting.clear()
+        self._size = 0
         known = {(one.key, one.payload) for one in early}
         for sample in self._in_order(answers):
             if (sample.key, sample.payload) not in known and self._holds(sample.key):
@@ -138,15 +147,19 @@ class Onlooker:
         return self
 
     async def __anext__(self) -> Sighting:
+        if self._loop.time() >= self._turn_ends:
+            await asyncio.sleep(0)
+            self._turn_ends = self._loop.time() + TURN
         while True:
             if self._rescued:
                 return self._rescued.popleft()
             if self._waiting:
-                return self._waiting.popleft()
+                return self._fetch()
             if self._closed:
                 raise StopAsyncIteration
             self._news.clear()
             await self._news.wait()
+            self._turn_ends = self._loop.time() + TURN
 
     async def listen_to_motivations(self, robot: str = "*") -> Registration:
         """Have the motivations of `robot` among the sightings until the registration is closed, if they are not already."""
@@ -193,14 +206,20 @@ class Onlooker:
             self._push(Sighting(time.time_ns(), self._clock.now(), key, b"", not present))
 
     def _push(self, sighting: Sighting) -> None:
-        if len(self._waiting) >= self._capacity:
-            oldest = self._waiting.popleft()
+        self._size += len(sighting.payload)
+        while self._waiting and (len(self._waiting) >= self._capacity or self._size > HEAVIEST):
+            oldest = self._fetch()
             if self._is_presence(oldest.key):
                 self._rescued.append(oldest)
             else:
                 self.overflowed += 1
         self._waiting.append(sighting)
         self._news.set()
+
+    def _fetch(self) -> Sighting:
+        oldest = self._waiting.popleft()
+        self._size -= len(oldest.payload)
+        return oldest
 
     def _is_presence(self, key: str) -> bool:
         return key.startswith(self._alive) or key == self._launcher

@@ -1,9 +1,9 @@
 """How often something comes: the rate and the gaps of the latest arrivals. Pure."""
 
-import itertools
-import statistics
 from collections import deque
 from typing import NamedTuple
+
+import numpy as np
 
 
 class Rate(NamedTuple):
@@ -35,9 +35,8 @@ class Arrivals:
 
     def rate(self) -> Rate | None:
         """How often they come; None while fewer than two have come."""
-        instants = list(self._instants)
-        gaps = [later - earlier for earlier, later in itertools.pairwise(instants)]
-        lasted = sum(gaps)
-        if not gaps or lasted <= 0:
+        gaps = np.diff(np.fromiter(self._instants, float))
+        lasted = float(gaps.sum())
+        if lasted <= 0:
             return None
-        return Rate(len(gaps) / lasted, min(gaps), max(gaps), statistics.pstdev(gaps), len(instants))
+        return Rate(len(gaps) / lasted, float(gaps.min()), float(gaps.max()), float(gaps.std()), len(self._instants))

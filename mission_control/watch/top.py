@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from lalliance_agents.clock import MissionClock
-from mission_control.live import bar
+from mission_control.live import bar, can_redraw
 from mission_control.reach import Reached, reached
 from mission_control.watch.board import ORDERS, Row, Selection, rows
 from mission_control.watch.explain import tell
@@ -46,7 +46,7 @@ async def top(mission: str | None, connect: str | None, keys: Path | None, *, on
     ):
         story = Story(there.mission)
         await meet(onlooker, story)
-        if once or as_json or not console.is_terminal:
+        if once or as_json or not can_redraw(console):
             await look(onlooker, story, lambda: _is_known(story))
             view = View(there, story, onlooker, console)
             typer.echo(json.dumps(view.plain())) if as_json else console.print(view.whole())
@@ -77,7 +77,7 @@ async def _go_on(view: "View", onlooker: Onlooker, story: Story) -> None:
     try:
         with (
             Live(console=view.console, get_renderable=view.screen, auto_refresh=False, screen=True) as live,
-            keyboard(press),
+            keyboard(press, lambda shown: _show(live, shown)),
         ):
             while not seen_enough.is_set():
                 pressed.clear()
@@ -89,6 +89,12 @@ async def _go_on(view: "View", onlooker: Onlooker, story: Story) -> None:
         following.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await following
+
+
+def _show(live: Live, shown: bool) -> None:
+    """Take the screen, or give it back to who has the terminal meanwhile."""
+    live.console.set_alt_screen(shown)
+    live.console.show_cursor(not shown)
 
 
 class View:

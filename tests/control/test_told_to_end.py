@@ -1,8 +1,10 @@
 """Ctrl-C and SIGTERM, whenever they come: a sentence or silence, the exit status that shells know, and nothing left."""
 
+import fcntl
 import signal
 import subprocess
 import sys
+import termios
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -41,6 +43,36 @@ def test_a_signal_while_a_command_is_being_imported_leaves_no_traceback(name: st
     assert (done.stdout, done.stderr) == ("", said)
     # Before there is a handler for it, SIGTERM does what it always does; a shell tells both alike.
     assert done.returncode in {128 + number, -number if number is signal.SIGTERM else 128 + number}
+
+
+TALKING = """
+import asyncio, sys
+from mission_control.shell import ToldToEnd, run_until_told
+
+async def talk():
+    while True:
+        print("x" * 1000)
+        await asyncio.sleep(0)
+
+try:
+    run_until_told(talk())
+except ToldToEnd as told:
+    sys.exit(128 + told.number)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_command_ends_that_waits_for_somebody_to_read_what_it_prints(number: signal.Signals) -> None:
+    talking = subprocess.Popen([sys.executable, "-c", TALKING], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    with talking:
+        assert talking.stdout is not None
+        descriptor = talking.stdout.fileno()
+        room = fcntl.fcntl(descriptor, fcntl.F_GETPIPE_SZ)
+        until(lambda: int.from_bytes(fcntl.ioctl(descriptor, termios.FIONREAD, bytes(4)), sys.byteorder) > room - 4096)
+        talking.send_signal(number)
+        assert talking.wait(20) == 128 + number
+        assert talking.stderr is not None
+        assert talking.stderr.read() == b""
 
 
 @pytest.mark.parametrize(

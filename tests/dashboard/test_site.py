@@ -1,7 +1,9 @@
 """Who may look at the page, who may disturb the mission, and what both get, by plain HTTP and WebSocket."""
 
+import contextlib
 import http.client
 import json
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -100,8 +102,8 @@ def test_a_page_of_somebody_else_cannot_watch(page: Page) -> None:
     assert refused.value.response.status_code == 403
     with pytest.raises(InvalidStatus), page.watch(additional_headers={"Host": "evil.example"}):
         pass
-    with page.watch(origin=f"http://{page.host}") as socket:
-        assert json.loads(socket.recv(10))["kind"] == "hello"
+    with page.watch(origin=f"http://{page.host}") as viewer:
+        assert json.loads(viewer.recv(10))["kind"] == "hello"
 
 
 def test_the_page_may_load_nothing_from_elsewhere(page: Page) -> None:
@@ -119,39 +121,39 @@ def test_the_page_may_load_nothing_from_elsewhere(page: Page) -> None:
 
 
 def test_a_slow_viewer_is_given_the_latest_state_and_no_queue(page: Page) -> None:
-    with page.watch() as socket:
-        assert json.loads(socket.recv(10))["kind"] == "hello"
-        first = json.loads(socket.recv(10))
+    with page.watch() as viewer:
+        assert json.loads(viewer.recv(10))["kind"] == "hello"
+        first = json.loads(viewer.recv(10))
         for second in range(7, 100):
             page.telling.status(float(second), a=second / 100)
         with pytest.raises(TimeoutError):
-            socket.recv(0.5)
-        socket.send(json.dumps({"drawn": first["number"]}))
-        second_one = json.loads(socket.recv(10))
+            viewer.recv(0.5)
+        viewer.send(json.dumps({"drawn": first["number"]}))
+        second_one = json.loads(viewer.recv(10))
     assert second_one["now"] == 99.0
     assert second_one["scene"]["tasks"]["a"]["progress"] == 0.99
 
 
 def test_a_viewer_asks_for_the_past(page: Page) -> None:
-    with page.watch() as socket:
-        socket.send(json.dumps({"show": 3.0, "robot": "left"}))
-        messages = [json.loads(socket.recv(10)) for _ in range(3)]
+    with page.watch() as viewer:
+        viewer.send(json.dumps({"show": 3.0, "robot": "left"}))
+        messages = [json.loads(viewer.recv(10)) for _ in range(3)]
     [past] = [message for message in messages if message["kind"] == "past"]
     assert (past["at"], past["scene"]["tasks"]["a"]["progress"]) == (3.0, 0.25)
 
 
 @pytest.mark.parametrize("message", ["not json", "[1]", "x" * 3000, "[" * 2000, b"{}"])
 def test_a_viewer_that_talks_nonsense_is_left(page: Page, message: str | bytes) -> None:
-    with page.watch() as socket:
-        socket.send(message)
+    with page.watch() as viewer:
+        viewer.send(message)
         with pytest.raises(ConnectionClosed) as left:
-            list(iter(lambda: socket.recv(10), None))
+            list(iter(lambda: viewer.recv(10), None))
     assert left.value.rcvd is not None
     assert left.value.rcvd.code in {1007, 1009}
-    with page.watch() as socket:
+    with page.watch() as viewer:
         for oddity in ({"show": "x"}, {"show": 1e400}, {"show": 10**400}, {"robot": 7}, {"drawn": None}, {}):
-            socket.send(json.dumps(oddity))
-        assert json.loads(socket.recv(10))["kind"] == "hello"
+            viewer.send(json.dumps(oddity))
+        assert json.loads(viewer.recv(10))["kind"] == "hello"
 
 
 def test_prometheus_reads_the_metrics(page: Page) -> None:
@@ -170,6 +172,33 @@ def test_prometheus_reads_the_metrics(page: Page) -> None:
     assert samples["lalliance_link_silence_seconds", "right", "left"] == 2.5
     assert samples["lalliance_mission_stage", "running"] == 1
     assert page.ask("GET", "/health")[:2] == (200, "ok\n")
+
+
+def test_whoever_only_connects_makes_room_for_others(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mission_control.dashboard.serving.MOST_CONNECTIONS", 5)
+    host, _, port = page.host.partition(":")
+    with contextlib.ExitStack() as opened, page.watch() as viewer:
+        assert json.loads(viewer.recv(10))["kind"] == "hello"
+        idle = [opened.enter_context(socket.create_connection((host, int(port)), timeout=10)) for _ in range(8)]
+        for one in idle:
+            one.sendall(b"GET / HT")
+        assert page.ask("GET", "/health")[0] == 200
+        with contextlib.suppress(ConnectionResetError):
+            assert idle[0].recv(1) == b""
+        assert json.loads(viewer.recv(10))["kind"] == "update"
+
+
+def test_a_connection_without_a_request_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mission_control.dashboard.serving.LONGEST_CONNECTION", 0.05)
+    with page_of(Telling().chronicle, Noting()) as (address, _):
+        host, _, port = urlsplit(address).netloc.partition(":")
+        with socket.create_connection((host, int(port)), timeout=10) as idle, contextlib.suppress(ConnectionResetError):
+            assert idle.recv(1) == b""
+
+
+def test_a_mission_that_is_not_heard_is_not_well(page: Page) -> None:
+    page.site.trouble = lambda: "nothing has been heard of the mission for 7 s"
+    assert page.ask("GET", "/health")[:2] == (503, "nothing has been heard of the mission for 7 s\n")
 
 
 def test_names_by_which_a_page_is_called() -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import pty
+import signal
 import sys
 import termios
 from collections.abc import Iterator
@@ -36,6 +37,34 @@ async def test_each_key_is_told_at_once_and_the_terminal_is_left_as_it_was(typed
         async with asyncio.timeout(10):
             assert [await pressed.get() for _ in range(3)] == ["x", " ", "up"]
     assert mode() == before
+
+
+async def test_who_stops_it_has_the_terminal_as_it_was_and_gives_it_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    far, near = pty.openpty()
+    with os.fdopen(near) as stdin, os.fdopen(far):
+        monkeypatch.setattr(sys, "stdin", stdin)
+        before = mode()
+        told: list[object] = []
+        over = asyncio.Event()
+
+        def kill(process: int, number: int) -> None:
+            told.append((process == os.getpid(), number, mode() == before))
+
+        def show(shown: bool) -> None:
+            told.append(shown)
+            if shown:
+                over.set()
+
+        monkeypatch.setattr(os, "kill", kill)
+        with keyboard(lambda _: None, show):
+            ours = mode()
+            signal.raise_signal(signal.SIGTSTP)
+            async with asyncio.timeout(10):
+                await over.wait()
+            assert told == [False, (True, signal.SIGTSTP, True), True]
+            assert mode() == ours != before
+        assert mode() == before
+        assert signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL
 
 
 async def test_where_nothing_can_be_typed_none_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -106,3 +106,39 @@ async def test_what_is_not_fetched_in_time_is_dropped_and_counted_but_for_presen
         ]
         # Nobody can pretend to be there by publishing; a hidden key is not even heard.
         assert (onlooker.overflowed, onlooker.misplaced, onlooker.dropped) == (3, 1, 4)
+
+
+async def test_others_have_their_turn_however_much_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mission_control.watch.onlooker.TURN", 0.0)
+    hub = MemoryHub()
+    turns = 0
+
+    async def others() -> None:
+        nonlocal turns
+        while True:
+            turns += 1
+            await asyncio.sleep(0)
+
+    async with MemoryBus(hub) as bus, Onlooker(bus, "m", MissionClock(), motivations=False) as onlooker:
+        for _ in range(100):
+            bus.put(STATUS, b"s", Delivery.STATE)
+        await asyncio.sleep(0)
+        counting = asyncio.create_task(others())
+        await fetch(onlooker, 100)
+        counting.cancel()
+    assert turns >= 99
+
+
+async def test_what_waits_is_limited_in_bytes_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mission_control.watch.onlooker.HEAVIEST", 1000)
+    hub = MemoryHub()
+    async with MemoryBus(hub) as bus, MemoryBus(hub) as robot:
+        await robot.announce_presence(ALIVE)
+        async with Onlooker(bus, "m", MissionClock(), motivations=False) as onlooker:
+            for number in range(5):
+                robot.put(STATUS, bytes([number]) * 300, Delivery.STATE)
+            robot.put(STATUS, bytes([5]), Delivery.STATE)
+            await asyncio.sleep(0)
+            got = await fetch(onlooker, 5)
+            assert [payload[:1] for _, payload, _ in got] == [b"", b"\2", b"\3", b"\4", b"\5"]
+            assert onlooker.overflowed == 2

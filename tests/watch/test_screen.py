@@ -9,6 +9,7 @@ from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.wire.keys import WORLD, Keys, Kind
 from lalliance_agents.wire.messages import Event, Status, encode
+from mission_control.live import can_redraw
 from mission_control.reach import Reached
 from mission_control.watch.onlooker import Onlooker
 from mission_control.watch.sighting import Sighting
@@ -70,3 +71,12 @@ async def test_who_follows_hears_what_happens_until_the_mission_is_over() -> Non
             world.put(said.key, said.payload, ["state", "telemetry"][number % 2])  # type: ignore[arg-type]
         told = [one.text async for one in further(onlooker, Story("m"))]
     assert told == ["one", "two"]
+
+
+@pytest.mark.parametrize(("term", "can"), [("xterm", True), ("dumb", False), ("unknown", False)])
+def test_a_terminal_that_only_prints_gets_no_view_that_goes_on(
+    monkeypatch: pytest.MonkeyPatch, term: str, can: bool
+) -> None:
+    monkeypatch.setenv("TERM", term)
+    assert can_redraw(Console(file=io.StringIO(), force_terminal=True)) == can
+    assert not can_redraw(Console(file=io.StringIO()))
