@@ -7,6 +7,7 @@ needed, so that `lalliance --help` is quick.
 
 import contextlib
 import errno
+import io
 import json
 import os
 import signal
@@ -264,6 +265,8 @@ def _fail(text: str, status: int) -> NoReturn:
 def main() -> None:
     """Run the command line; errors become one sentence on standard error."""
     sys.path.insert(0, str(Path.cwd()))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # not every terminal has all the letters that are printed
     try:
         end_when_told()
         app()

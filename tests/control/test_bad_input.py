@@ -185,6 +185,14 @@ def test_what_is_good_is_called_good(processes: Processes) -> None:
     assert done.stdout == "good.yaml is a good mission: good, with 2 robots, 2 tasks, 1 trial, 0 faults\n"
 
 
+def test_what_a_terminal_has_no_letters_for_is_left_open(processes: Processes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONIOENCODING", "latin-1")
+    (processes.folder / "g\N{GREEK SMALL LETTER TAU}d.yaml").write_text(GOOD)
+    done = processes.run("check", "g\N{GREEK SMALL LETTER TAU}d.yaml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("g?d.yaml is a good mission: good")
+
+
 def test_the_schema_is_json_and_knows_the_options_of_environments(processes: Processes) -> None:
     schema = json.loads(processes.run("schema").stdout)
     assert schema["properties"].keys() >= {"name", "tasks", "robots", "parameters", "phases", "faults"}

@@ -19,7 +19,7 @@ from lalliance_agents.errors import UserError
 from lalliance_agents.wire.messages import BODY_OF, decode_at
 from mission_control.recording.convert import convert, plain_content
 from mission_control.recording.format import ABOUT
-from mission_control.recording.reader import information, sightings
+from mission_control.recording.reader import Recording, information, sightings
 from mission_control.watch.sighting import Sighting
 
 
@@ -150,3 +150,19 @@ def test_nothing_is_left_of_what_could_not_be_written_and_nothing_is_overwritten
     with pytest.raises(UserError, match="no such file"):
         convert(tmp_path / "none.mcap", tmp_path / "b.mcap")
     assert not (tmp_path / "b.mcap").exists()
+
+
+def test_what_came_to_its_place_meanwhile_is_not_overwritten(tmp_path: Path) -> None:
+    out = tmp_path / "json.mcap"
+
+    def put_there() -> Iterator[Sighting]:
+        yield from mixture()
+        out.write_text("precious")
+
+    path = write(tmp_path / "a.mcap", mixture())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Recording, "__iter__", lambda _: put_there())
+        with pytest.raises(UserError, match=r"json\.mcap: there is something already"):
+            convert(path, out)
+    assert out.read_text() == "precious"
+    assert {one.name for one in tmp_path.iterdir()} == {"a.mcap", "json.mcap"}
