@@ -48,7 +48,8 @@ def read_token(path: Path) -> str:
     least, most = TOKEN_LENGTH
     expected = f"expected {least} to {most} letters, digits or signs without a space"
     try:
-        token = path.read_text(encoding="ascii").strip()
+        with path.open(encoding="ascii") as file:
+            token = file.read(2 * most).strip()  # a device can be without end
     except OSError as error:
         raise UserError(f"{path}: the token cannot be read ({error.strerror}); {expected}") from None
     except UnicodeDecodeError:

@@ -221,5 +221,7 @@ def test_a_file_that_holds_no_token_is_refused(tmp_path: Path, content: str, why
     path.write_text(content)
     with pytest.raises(UserError, match=why):
         read_token(path)
+    with pytest.raises(UserError, match="/dev/zero: this is no token"):
+        read_token(Path("/dev/zero"))
     path.write_text(f"{TOKEN}\n")
     assert read_token(path) == TOKEN
