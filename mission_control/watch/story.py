@@ -9,7 +9,9 @@ where one was missed, what the robot announces tells that it is on a task, or id
 """
 
 from collections import Counter, deque
+from collections.abc import Container
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from lalliance_agents.errors import MessageError
 from lalliance_agents.model.events import Verb
@@ -223,12 +225,14 @@ class Story:
         return None
 
     def _robot(self, name: str) -> RobotSeen | None:
-        if name not in self.robots and len(self.robots) < MOST_NAMES:
+        own = self.status.robots if self.status is not None else {}
+        if name not in self.robots and _has_room(self.robots, name, own):
             self.robots[name] = RobotSeen(name)
         return self.robots.get(name)
 
     def _task(self, name: str) -> TaskSeen | None:
-        if name not in self.tasks and len(self.tasks) < MOST_NAMES:
+        own = self.status.tasks if self.status is not None else {}
+        if name not in self.tasks and _has_room(self.tasks, name, own):
             self.tasks[name] = TaskSeen(name)
         return self.tasks.get(name)
 
@@ -375,6 +379,16 @@ class Story:
         for seen in self.robots.values():
             for attempt in list(seen.attempts.values()):
                 self._end(seen, attempt, self._latest, why)
+
+
+def _has_room(known: dict[str, Any], name: str, own: Container[str]) -> bool:
+    """Whether `name` can be told apart as well; what the world calls its own takes the place of what was made up."""
+    if len(known) < MOST_NAMES:
+        return True
+    stranger = next((one for one in known if one not in own), None) if name in own else None
+    if stranger is not None:
+        del known[stranger]
+    return stranger is not None
 
 
 def _number(value: object) -> float:

@@ -188,3 +188,16 @@ def test_a_robot_that_is_far_ahead_of_the_world_is_not_believed() -> None:
     assert bus.story.happened[-1].at == 6.0
     bus.decide("activate", "free", 12.0, elapsed=300.0)
     assert bus.story.happened[-1].at == 300.0
+
+
+def test_made_up_robots_make_room_for_those_of_the_world() -> None:
+    bus = Bus()
+    for number in range(MOST_NAMES):
+        bus.story.take(Sighting(0, 0.0, KEYS.build(Kind.ALIVE, robot=f"ghost-{number}"), b""))
+    bus.say(Kind.HEARTBEAT, 1.0, by="left", trial=0)
+    assert "left" not in bus.story.robots
+    bus.status(2.0, elapsed=1.0, left={"present": True}, right={"present": True})
+    assert [bus.story.robots[name].present for name in ("left", "right")] == [True, True]
+    assert len(bus.story.robots) == MOST_NAMES
+    bus.say(Kind.HEARTBEAT, 3.0, by="one-more-ghost", trial=0)
+    assert "one-more-ghost" not in bus.story.robots
