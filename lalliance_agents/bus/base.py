@@ -13,17 +13,15 @@ published is ignored and queries have no answers, while a new declaration is a m
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from types import TracebackType
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 #: After this silence, in real seconds, a participant that hangs or is cut off counts as gone.
 LEASE = 2.0
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
+class Sample(NamedTuple):
     """One message as it arrived."""
 
     key: str

@@ -79,8 +79,14 @@ class Inlet(Generic[Raw]):
             )
 
 
+_Queued = tuple[Inlet[Any], Any]
+
+
 class Inbox:
     """The queue between whoever receives and the event loop.
+
+    While there is room, a push takes no lock: each step on a deque is one that no other thread can come between. Taking out
+    is locked, once a batch, as messages must leave in order.
 
     Args:
         wake: has a function called once in the loop: `loop.call_soon_threadsafe`, or `loop.call_soon` without threads.
@@ -95,14 +101,14 @@ class Inbox:
         self.dropped_oversize = 0
         self._wake = wake
         self._lock = threading.Lock()
-        self._waiting: deque[tuple[Inlet[Any], Any]] = deque()
-        # What must be kept but reached the old end of a full queue: older than all that waits, and delivered first.
-        self._rescued: deque[tuple[Inlet[Any], Any]] = deque()
+        self._waiting: deque[_Queued] = deque()
+        # Older than all that waits: the batch at hand, and what must be kept but reached the old end of a full queue.
+        self._ahead: deque[_Queued] = deque()
         self._woken = False
         self._closed = False
 
     def __len__(self) -> int:
-        return len(self._waiting) + len(self._rescued)
+        return len(self._waiting) + len(self._ahead)
 
     def admits(self, size: int) -> bool:
         """Whether a payload of `size` bytes is accepted; one that is not is counted. In any thread."""
@@ -114,37 +120,34 @@ class Inbox:
 
     def push(self, inlet: Inlet[Raw], raw: Raw) -> None:
         """Queue a message; in any thread."""
-        with self._lock:
-            lost = self._make_room()
-            if self._closed:
-                lost, wake = (inlet, raw), False
-            else:
-                self._waiting.append((inlet, raw))
-                wake, self._woken = not self._woken, True
-        if lost is not None:
-            lost[0].discard(lost[1])
-        if wake:
+        self._waiting.append((inlet, raw))
+        if len(self._waiting) > CAPACITY:
+            self._make_room()
+        if self._closed:  # asked last, so that nothing stays that came while it closed
+            self.close()
+        elif not self._woken:
+            self._woken = True  # two threads may both wake it: a turn too many, and no harm
             self._wake_up()
 
     def close(self) -> None:
         """Discard all that waits and all that comes; a second call does nothing."""
-        with self._lock:
-            self._closed = True
-            left = [*self._rescued, *self._waiting]
-            self._rescued.clear()
-            self._waiting.clear()
-        for inlet, raw in left:
-            inlet.discard(raw)
+        self._closed = True
+        for queue in (self._ahead, self._waiting):
+            while message := _oldest(queue):
+                message[0].discard(message[1])
 
-    def _make_room(self) -> tuple[Inlet[Any], Any] | None:
-        if len(self._waiting) < CAPACITY:
-            return None
-        oldest = self._waiting.popleft()
-        if oldest[0].keep:
-            self._rescued.append(oldest)
-            return None
-        self.dropped_overflow += 1
-        return oldest
+    def _make_room(self) -> None:
+        with self._lock:
+            if len(self._waiting) <= CAPACITY:
+                return
+            oldest = _oldest(self._waiting)
+            if oldest is None:
+                return
+            if oldest[0].keep:
+                self._ahead.append(oldest)
+                return
+            self.dropped_overflow += 1
+        oldest[0].discard(oldest[1])
 
     def _wake_up(self) -> None:
         try:
@@ -153,23 +156,31 @@ class Inbox:
             self.close()
 
     def _drain(self) -> None:
+        self._take_batch()
         try:
             for _ in range(BATCH):
-                message = self._next()
+                message = _oldest(self._ahead)
                 if message is None:
                     break
                 message[0].deliver(message[1])
         finally:
-            with self._lock:
-                self._woken = again = len(self) > 0
-            if again:
+            self._woken = False
+            if len(self) > 0:
+                self._woken = True
                 self._wake_up()
 
-    def _next(self) -> tuple[Inlet[Any], Any] | None:
+    def _take_batch(self) -> None:
         with self._lock:
-            if self._rescued:
-                return self._rescued.popleft()
-            return self._waiting.popleft() if self._waiting else None
+            while len(self._ahead) < BATCH and (message := _oldest(self._waiting)):
+                self._ahead.append(message)
+
+
+def _oldest(queue: deque[_Queued]) -> _Queued | None:
+    """The message at the old end, taken out; None if there is none, though there was one just before."""
+    try:
+        return queue.popleft()
+    except IndexError:
+        return None
 
 
 class QueuedBus(Bus):

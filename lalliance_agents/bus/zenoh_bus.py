@@ -28,6 +28,7 @@ from lalliance_agents.bus.session import (
     close_when_forgotten,
     open_session,
 )
+from lalliance_agents.bus.threads import stay_known
 from lalliance_agents.errors import BusError
 
 Raw = TypeVar("Raw")
@@ -222,6 +223,7 @@ class ZenohBus(QueuedBus):
         inbox = self._inbox
 
         def listen(raw: zenoh.Sample | zenoh.Query) -> None:
+            stay_known()
             payload = raw.payload
             if payload is None or inbox.admits(len(payload)):
                 inbox.push(inlet, raw)
@@ -235,6 +237,7 @@ class ZenohBus(QueuedBus):
         inbox = self._inbox
 
         def gather(reply: zenoh.Reply) -> None:
+            stay_known()
             raw = reply.ok
             if raw is not None and inbox.admits(len(raw.payload)):
                 inquiry.replies.append(_sample(raw))
