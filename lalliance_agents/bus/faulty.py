@@ -23,7 +23,7 @@ from lalliance_agents.bus.drops import OTHERS
 from lalliance_agents.bus.inbox import Inlet
 from lalliance_agents.bus.link import LinkRules, RuledLink
 from lalliance_agents.bus.messenger import Messenger
-from lalliance_agents.bus.patterns import check_pattern, intersects
+from lalliance_agents.bus.patterns import MAX_KEY, check_pattern, intersects
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.errors import MessageError
 from lalliance_agents.faults import fits
@@ -171,6 +171,8 @@ class FaultyBus(Bus):
 
     def _treatment(self, text: str) -> _Treatment | None:
         """What is in force for samples on a key, if anything is."""
+        if len(text) > MAX_KEY:  # no key of a robot's, and too long to be remembered
+            return None
         if text not in self._treatments:
             if len(self._treatments) >= MOST_KEYS:
                 self._treatments.clear()

@@ -29,6 +29,7 @@ that begins with `@`, which no robot can have.
 
 import re
 from enum import StrEnum
+from functools import lru_cache
 from typing import NamedTuple
 
 from lalliance_agents.errors import MessageError
@@ -101,6 +102,8 @@ def _shapes() -> dict[tuple[str, ...], Kind]:
 
 
 _SHAPES = _shapes()
+#: No key is longer below its mission.
+_LONGEST = max(map(len, Kind)) + 2 * 64
 
 
 class Keys:
@@ -123,13 +126,23 @@ class Keys:
         Raises:
             MessageError: it is no key of this mission.
         """
-        if key.startswith(self.prefix):
-            chunks = key[len(self.prefix) :].split("/")
-            for shape, kind in _SHAPES.items():
-                names = _match(shape, chunks)
-                if names is not None:
-                    return Key(kind, **names)
-        raise MessageError("key", f"{repr(key[:80])[:80]} is not a key of this mission")
+        below = key[len(self.prefix) :] if key.startswith(self.prefix) else ""
+        found = _taken_apart(below) if len(below) <= _LONGEST else None
+        if found is None:
+            raise MessageError("key", f"{repr(key[:80])[:80]} is not a key of this mission")
+        return found
+
+
+# The same keys come again and again. A limited number are remembered, as whoever makes up names makes up keys.
+@lru_cache(maxsize=2**14)
+def _taken_apart(below: str) -> Key | None:
+    """What stands below a mission; None: no key."""
+    chunks = below.split("/")
+    for shape, kind in _SHAPES.items():
+        names = _match(shape, chunks)
+        if names is not None:
+            return Key(kind, **names)
+    return None
 
 
 def _match(shape: tuple[str, ...], chunks: list[str]) -> dict[str, str] | None:

@@ -341,9 +341,14 @@ def _first_fault(error: ValidationError) -> str:
     return f"{(where if where.isprintable() else repr(where))[:80]}: {first['type']}"
 
 
+#: Up to this size, in bytes, the worst that a payload can claim is a megabyte.
+_SHORT = 512
+
+
 def _unpack(payload: bytes) -> Any:
     try:
-        _walk(payload)
+        if len(payload) > _SHORT:
+            _walk(payload)
         return msgpack.unpackb(payload)
     except Exception as error:
         raise MessageError("msgpack", type(error).__name__) from None
@@ -353,7 +358,8 @@ def _walk(payload: bytes) -> None:
     """Go through a document and keep nothing, so that only a whole one is unpacked.
 
     For a list msgpack makes room as soon as its length is claimed: a thousand lists in one another, each of a length that
-    the payload might just hold, cost up to a gigabyte. In a whole document all lengths together fit into the payload.
+    the payload might just hold, cost up to a gigabyte. In a whole document all lengths together fit into the payload. What is
+    short cannot claim as much, and most messages are.
     """
     walker = msgpack.Unpacker(read_size=1)
     walker.feed(payload)
