@@ -105,7 +105,7 @@ class ZenohBus(QueuedBus):
         self.endpoint = endpoint
         self._session = session
         self._loop = asyncio.get_running_loop()
-        self._inbox = Inbox(self._loop.call_soon_threadsafe)
+        self._inbox = Inbox(self._loop.call_soon_threadsafe, self._loop)
         # Zenoh forgets most declarations with their last reference.
         self._declared: set[_Declared] = set()
         self._inquiries: set[Inquiry] = set()
@@ -140,7 +140,11 @@ class ZenohBus(QueuedBus):
     async def subscribe(self, pattern: str, handler: Handler) -> "_Declared":
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
         expression = self._expression(pattern)
-        inlet: Inlet[zenoh.Sample] = Inlet(f"the subscription {pattern!r}", lambda raw: handler(_sample(raw)))
+
+        def hear(raw: zenoh.Sample) -> None:
+            handler(Sample(str(raw.key_expr), raw.payload.to_bytes()))
+
+        inlet: Inlet[zenoh.Sample] = Inlet(f"the subscription {pattern!r}", hear)
         return self._declare(inlet, self._session.declare_subscriber(expression, self._listener(inlet)))
 
     async def answer(self, pattern: str, handler: Answer) -> "_Declared":
@@ -240,7 +244,7 @@ class ZenohBus(QueuedBus):
             stay_known()
             raw = reply.ok
             if raw is not None and inbox.admits(len(raw.payload)):
-                inquiry.replies.append(_sample(raw))
+                inquiry.replies.append(Sample(str(raw.key_expr), raw.payload.to_bytes()))
 
         return gather
 
@@ -298,10 +302,6 @@ class ZenohPublication(_Declared):
         # Typed as a bool, but in fact a MatchingStatus, which is always true.
         status: Any = self._publisher.matching_status
         return bool(getattr(status, "matching", status))
-
-
-def _sample(raw: zenoh.Sample) -> Sample:
-    return Sample(str(raw.key_expr), raw.payload.to_bytes())
 
 
 def _reply(query: zenoh.Query, handler: Answer) -> None:

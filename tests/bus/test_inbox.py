@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from lalliance_agents.bus.inbox import BATCH, CAPACITY, Inbox, Inlet
+from lalliance_agents.bus.inbox import BATCH, CAPACITY, REST, Inbox, Inlet
 
 
 class Turns:
@@ -24,6 +24,49 @@ class Turns:
         for call in now:
             call()
         return len(now)
+
+
+class Loop(Turns):
+    """The same with a clock; what is to run later runs when a test lets time pass."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now = 0.0
+        self.later = []
+
+    def time(self) -> float:
+        return self.now
+
+    def call_later(self, delay: float, call: Callable[[], None]) -> None:
+        self.later.append((delay, call))
+
+    def passes(self, seconds: float) -> None:
+        self.now += seconds
+        due, self.later = self.later, []
+        for _, call in due:
+            call()
+
+
+def test_when_messages_throng_the_loop_rests_and_takes_all_that_came_meanwhile() -> None:
+    loop, heard = Loop(), []
+    inbox = Inbox(loop.wake, loop)
+    inlet = Inlet("x", heard.append)
+    inbox.push(inlet, 1)
+    assert (loop.turn(), heard, loop.later) == (1, [1], [])
+    loop.passes(REST / 4)
+    inbox.push(inlet, 2)
+    assert (loop.turn(), heard) == (1, [1, 2])
+    assert [delay for delay, _ in loop.later] == [REST]
+    for number in (3, 4):
+        inbox.push(inlet, number)
+    assert loop.turn() == 0
+    loop.passes(REST)
+    assert (heard, len(loop.later)) == ([1, 2, 3, 4], 1)
+    inbox.push(inlet, 5)
+    loop.passes(REST)
+    assert (heard, loop.later) == ([1, 2, 3, 4, 5], [])
+    inbox.push(inlet, 6)
+    assert (loop.turn(), heard[5:]) == (1, [6])
 
 
 def test_one_wake_up_per_batch_and_a_bounded_batch_per_turn() -> None:
