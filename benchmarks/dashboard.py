@@ -1,8 +1,8 @@
 """How much the web page costs: a team of 100 robots with 200 tasks, each robot heard 5 times a second, and several viewers.
 
-    python benchmarks/dashboard.py                 the server and viewers without a browser
-    python benchmarks/dashboard.py --browser       also a page in Chromium, and how long its frames take
-    python benchmarks/dashboard.py --serve         the page alone, to be looked at, until Ctrl-C
+    python benchmarks/dashboard.py [--quick] [--json FILE]     the server and viewers without a browser
+    python benchmarks/dashboard.py --browser                   also a page in Chromium, and how long its frames take
+    python benchmarks/dashboard.py --serve                     the page alone, to be looked at, until Ctrl-C
 
 The mission is made up: robots take tasks one after the other, hold them for a while, fail, are taken over. What they say is
 encoded as on a bus and handed to the chronicle as it would come from there, in real time.
@@ -16,10 +16,12 @@ import random
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from statistics import mean, quantiles
 from typing import Any
 
 import websockets
+from form import Columns, options, publish
 from playwright.sync_api import sync_playwright
 from rich.console import Console
 
@@ -37,8 +39,11 @@ from mission_control.watch.story import Story
 MISSION = "synthetic"
 PERIOD = 0.2
 TASKS_OF_ONE = 12
-CHROMIUM = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync")
-FLAGS = (*CHROMIUM, "--disable-background-networking", "--disable-component-update")
+CHROMIUM = "/usr/bin/chromium"
+FLAGS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
+    "--disable-background-networking", "--disable-component-update",
+]  # fmt: skip
 
 
 class Team:
@@ -209,16 +214,16 @@ class Watcher:
                 await socket.send(json.dumps({"drawn": message["number"]}))
 
 
-def look(address: str, seconds: float) -> dict[str, Any]:
-    """Have the page open in Chromium for a while; how many frames it drew, and how long each took, in milliseconds."""
+def look(address: str, seconds: float) -> list[float]:
+    """Have the page open in Chromium for a while; how long each frame took that it drew, in milliseconds."""
     with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path="/usr/bin/chromium", args=[*FLAGS])
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         page = browser.new_page(viewport={"width": 1440, "height": 1000})
         page.goto(address)
         page.wait_for_timeout(seconds * 1000)
         frames = page.evaluate("performance.getEntriesByName('frame').map((one) => one.duration)")
         browser.close()
-    return {"frames_per_second": round(len(frames) / seconds, 1), "frame_ms": spread(frames)}
+    return [float(one) for one in frames]
 
 
 async def looking(address: str, seconds: float) -> Any:
@@ -229,22 +234,32 @@ async def looking(address: str, seconds: float) -> Any:
     return json.loads(out)
 
 
-def spread(values: list[float]) -> dict[str, float]:
-    """Mean, 95th percentile and largest."""
+def spread(what: str, unit: str, values: list[float]) -> dict[str, Any]:
+    """A row: mean, 95th percentile and largest."""
     if len(values) < 2:
-        return {"mean": round(mean(values), 2) if values else 0.0}
+        values = [*values, *values] or [0.0, 0.0]
+    most = max(values)
     return {
-        "mean": round(mean(values), 2), "p95": round(quantiles(values, n=20)[-1], 2), "most": round(max(values), 2)
-    }  # fmt: skip
+        "what": what,
+        "unit": unit,
+        "mean": mean(values),
+        "p95": min(quantiles(values, n=20)[-1], most),
+        "most": most,
+    }
 
 
-def milliseconds(values: list[float]) -> dict[str, float]:
-    """The spread of times, in milliseconds."""
-    return spread([1000 * value for value in values])
+def single(what: str, unit: str, value: float) -> dict[str, Any]:
+    """A row of one figure."""
+    return {"what": what, "unit": unit, "mean": value, "p95": None, "most": None}
 
 
-async def measure(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Run everything for a while; what it cost."""
+def milliseconds(what: str, seconds: list[float]) -> dict[str, Any]:
+    """A row of times."""
+    return spread(what, "ms", [1000 * value for value in seconds])
+
+
+async def measure(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    """Run everything for a while; a row for each thing that it cost."""
     server = Server(arguments.robots, arguments.tasks)
     listening = listen("127.0.0.1", arguments.port)
     quick, slow = [Watcher() for _ in range(arguments.viewers)], Watcher(slowness=2.0)
@@ -266,23 +281,37 @@ async def measure(arguments: argparse.Namespace) -> dict[str, Any]:
             part.cancel()
         await asyncio.gather(*work, return_exceptions=True)
     lags = [lag for one in quick for lag in one.lags]
-    return {
-        "messages_per_second": round(server.messages / (len(server.taking) * PERIOD)),
-        "take_cpu_ms_per_period": milliseconds(server.taking),
-        "settle_cpu_ms_per_period": milliseconds(server.settling),
-        "period_late_ms": milliseconds(server.late),
-        "updates_per_second_of_a_viewer": round(mean(len(one.sizes) for one in quick) / lasted, 1),
-        "update_kilobytes": spread([size / 1000 for one in quick for size in one.sizes[1:]]),
-        "viewer_behind_s": spread(lags),
-        "slow_viewer": {"updates": len(slow.sizes), "behind_s": spread(slow.lags)},
-        "processor_share": round(used / lasted, 2),
-        "browser": shown,
-    }
+    rows = [
+        single("messages that come", "a second", server.messages / (len(server.taking) * PERIOD)),
+        milliseconds("CPU time for a period's messages", server.taking),
+        milliseconds("CPU time to settle a period", server.settling),
+        milliseconds("how late a period begins", server.late),
+        single("updates that a quick viewer gets", "a second", mean(len(one.sizes) for one in quick) / lasted),
+        spread("an update", "kB", [size / 1000 for one in quick for size in one.sizes[1:]]),
+        milliseconds("how far a quick viewer is behind", lags),
+        single("updates that the slow viewer gets", "a second", len(slow.sizes) / lasted),
+        milliseconds("how far the slow viewer is behind", slow.lags),
+        single("processor time of the server and these viewers", "cores", used / lasted),
+    ]
+    if shown is not None:
+        frames = [float(one) for one in shown]
+        rows.append(single("frames that a page in Chromium draws", "a second", len(frames) / arguments.seconds))
+        rows.append(spread("a frame", "ms", frames))
+    return rows
+
+
+COLUMNS: Columns = {
+    "what": lambda one: one["what"],
+    "mean": lambda one: f"{one['mean']:,.2f}",
+    "95th percentile": lambda one: "" if one["p95"] is None else f"{one['p95']:,.2f}",
+    "most": lambda one: "" if one["most"] is None else f"{one['most']:,.2f}",
+    "unit": lambda one: one["unit"],
+}
 
 
 def main() -> None:
     """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = options(__doc__)
     parser.add_argument("--robots", type=int, default=100)
     parser.add_argument("--tasks", type=int, default=200)
     parser.add_argument("--viewers", type=int, default=4, help="quick ones; there is a slow one besides")
@@ -291,9 +320,18 @@ def main() -> None:
     parser.add_argument("--browser", action="store_true")
     parser.add_argument("--serve", action="store_true")
     parser.add_argument("--look", metavar="ADDRESS", help="only have the page there open in Chromium")
-    arguments = parser.parse_args()
-    found = asyncio.run(measure(arguments)) if arguments.look is None else look(arguments.look, arguments.seconds)
-    Console().print_json(json.dumps(found))
+    chosen = parser.parse_args()
+    if chosen.quick:
+        chosen.seconds = 2.0
+    if chosen.look is not None:
+        Console(soft_wrap=True, highlight=False).print_json(json.dumps(look(chosen.look, chosen.seconds)))
+        return
+    if chosen.browser and not Path(CHROMIUM).exists():
+        raise SystemExit(f"{CHROMIUM}: no such file; expected Chromium there, or no --browser")
+    rows = asyncio.run(measure(chosen))
+    seen = "and a page in Chromium" if chosen.browser else "without a browser"
+    crowd = f"{chosen.robots} robots, {chosen.tasks} tasks, {chosen.viewers} quick viewers and a slow one, {seen}"
+    publish(f"The web page: {crowd}", COLUMNS, rows, path=chosen.json, packages=["starlette", "websockets"])
 
 
 if __name__ == "__main__":

@@ -5,22 +5,16 @@ robots able to do a task (1 + heterogeneity) times as slow as the fastest. Secon
 beside; the limit is of the solver's work, in its own seconds, so that what is proven does not depend on the machine. `bounds`
 are those proven without any search; a gap is how far the makespan found is above the proven lower bound.
 
-    python benchmarks/optimum.py [--json FILE] [--missions N] [--limit WORK] [--tolerance SHARE]
+    python benchmarks/optimum.py [--quick] [--json FILE] [--missions N] [--limit WORK] [--tolerance SHARE]
 """
 
-import argparse
-import json
-import platform
 import statistics
 import time
-from importlib.metadata import version
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
+from form import Columns, options, publish
 
 from lalliance_study.assignments import Floats
 from lalliance_study.optimum import TOLERANCE, optimum, shared_optimum
@@ -75,31 +69,23 @@ def row(
     }
 
 
-def show(rows: list[dict[str, Any]]) -> None:
-    """Print the rows as a table."""
-    table = Table(title="Proven optima, one core", title_justify="left", box=None, pad_edge=False)
-    for column in ("robots", "tasks", "able", "spread", "bounds", "proven", "median", "longest", "gap", "shared"):
-        table.add_column(column, justify="right")
-    for one in rows:
-        table.add_row(
-            str(one["robots"]),
-            str(one["tasks"]),
-            str(one["coverage"]),
-            f"{one['heterogeneity']:.0%}",
-            f"{one['bounds']}/{one['missions']}",
-            f"{one['proven']}/{one['missions']}",
-            f"{one['median_seconds']:.3f} s",
-            f"{one['longest_seconds']:.3f} s",
-            f"{one['largest_gap']:.1%}",
-            f"{one['shared_median_seconds'] * 1000:.0f} ms",
-        )
-    Console().print(table)
+COLUMNS: Columns = {
+    "robots": lambda one: f"{one['robots']}",
+    "tasks": lambda one: f"{one['tasks']}",
+    "able": lambda one: f"{one['coverage']}",
+    "spread": lambda one: f"{one['heterogeneity']:.0%}",
+    "bounds": lambda one: f"{one['bounds']}/{one['missions']}",
+    "proven": lambda one: f"{one['proven']}/{one['missions']}",
+    "median": lambda one: f"{one['median_seconds']:.3f} s",
+    "longest": lambda one: f"{one['longest_seconds']:.3f} s",
+    "gap": lambda one: f"{one['largest_gap']:.1%}",
+    "shared": lambda one: f"{one['shared_median_seconds'] * 1000:.0f} ms",
+}
 
 
 def main() -> None:
-    """Print a table and write a JSON file if one is named."""
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--json", type=Path, help="where to write the figures")
+    """Run from the command line."""
+    arguments = options(__doc__)
     arguments.add_argument("--missions", type=int, default=10, help="missions of each size")
     arguments.add_argument(
         "--limit", type=float, default=30.0, help="work for one optimum, in the solver's own seconds"
@@ -108,12 +94,20 @@ def main() -> None:
     chosen = arguments.parse_args()
     optimum(draw(0, 8, 16, 4, 1), time_limit=1.0)  # what is imported on first use is no part of the measure
     given = {"missions": chosen.missions, "limit": chosen.limit, "tolerance": chosen.tolerance}
-    cases = [(*size, coverage, spread) for size, coverage, spread in product(SIZES, COVERAGES, HETEROGENEITIES)]
+    sizes = SIZES
+    if chosen.quick:
+        given, sizes = {**given, "missions": 2, "limit": 0.1}, SIZES[:2]
+    cases = [(*size, coverage, spread) for size, coverage, spread in product(sizes, COVERAGES, HETEROGENEITIES)]
     rows = [row(*case, **given) for case in cases if case[2] <= case[0] or case[2] == COVERAGES[0]]
-    show(rows)
-    if chosen.json is not None:
-        machine = {"python": platform.python_version(), "machine": platform.machine(), "ortools": version("ortools")}
-        chosen.json.write_text(json.dumps({"machine": machine, "arguments": given, "optimum": rows}, indent=2) + "\n")
+    work = f"work for one optimum: at most {given['limit']:g} s of the solver's own"
+    publish(
+        "Proven optima, one core",
+        COLUMNS,
+        rows,
+        path=chosen.json,
+        notes=[f"Missions of each size: {given['missions']}; {work}."],
+        packages=["ortools"],
+    )
 
 
 if __name__ == "__main__":
