@@ -6,7 +6,7 @@ SETUP := .venv/.set-up
 # What a cluster is told as it stands; the kustomization adds the mission and the keys.
 MANIFESTS := $(filter-out %/kustomization.yaml %/mission.yaml,$(wildcard deploy/kubernetes/*.yaml))
 
-.PHONY: demo test test-compose campaign docs check clean
+.PHONY: demo test test-compose campaign bench docs check clean
 
 # What MkDocs Material says of its successor is known.
 export NO_MKDOCS_2_WARNING := 1
@@ -34,6 +34,9 @@ campaign: $(SETUP)  ## random missions with faults, held to what must never fail
 docs: $(SETUP)  ## the pages of docs/ as a site, in site/; first, what is made from the code is made anew in them
 	PYTHONPATH=docs $(BIN)/python -m made
 	$(BIN)/mkdocs build --quiet
+
+bench: $(SETUP)  ## every benchmark, and the page that shows what came of them; needs 15 minutes and a quiet machine
+	$(BIN)/python benchmarks/all.py
 
 check: $(SETUP)
 	$(BIN)/ruff check .

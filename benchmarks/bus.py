@@ -35,6 +35,8 @@ TOLD = {
     "coroutine": "the bus, to a coroutine",
     "messenger": "the bus, to a receiver of checked messages",
 }
+#: Those of which the ratios are made.
+QUICK = ["callback", "hop", "coroutine"]
 #: What `coroutine` is to bring of what `callback` receives, and how many times what `hop` brings.
 OF_CALLBACK, TIMES_HOP = 0.5, 3.0
 
@@ -73,12 +75,11 @@ def measure(way: str, *, direct: bool, seconds: float) -> dict[str, float]:
     """What comes through in one way: messages a second and shares; delays in seconds."""
     endpoint = ["--endpoint", free_endpoint(), *(["--direct"] if direct else [])]
     with ExitStack() as there:
-        if not direct:
-            there.enter_context(End("route", *endpoint))
-        receiver = there.enter_context(End("receive", *endpoint, "--way", way))
-        receiver.hear()
-        publisher = there.enter_context(End("publish", *endpoint))
-        publisher.hear()
+        roles = [["receive", "--way", way], ["publish"], *([] if direct else [["route"]])]
+        ends = [there.enter_context(End(*role, *endpoint)) for role in roles]
+        for one in ends:
+            one.hear()  # that it is ready
+        receiver, publisher = ends[:2]
         paced = int(publisher.ask(f"paced {seconds}"))
         # Who looks for news is to find some.
         flood = int(publisher.ask(f"{'numbered' if way == 'messenger' else 'flood'} {seconds}"))
@@ -141,10 +142,11 @@ def main() -> None:
     chosen = arguments.parse_args()
     count, seconds = (1, 0.1) if chosen.quick else (chosen.rounds, chosen.seconds)
     rounds: dict[bool, list[dict[str, dict[str, float]]]] = {True: [], False: []}
+    ways = {True: list(TOLD), False: QUICK if chosen.quick else list(TOLD)}
     for _ in range(count):
         for direct, done in rounds.items():
-            done.append({way: measure(way, direct=direct, seconds=seconds) for way in TOLD})
-    rows = [summary(way, direct=direct, rounds=done) for direct, done in rounds.items() for way in TOLD]
+            done.append({way: measure(way, direct=direct, seconds=seconds) for way in ways[direct]})
+    rows = [summary(way, direct=direct, rounds=done) for direct, done in rounds.items() for way in ways[direct]]
     form.publish(
         "From `put` in one process to another",
         COLUMNS,

@@ -16,7 +16,6 @@ import random
 import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from statistics import mean, quantiles
 from typing import Any
 
@@ -24,6 +23,7 @@ import websockets
 from form import Columns, options, publish
 from playwright.sync_api import sync_playwright
 from rich.console import Console
+from suite import CHROMIUM
 
 from lalliance_agents.wire.keys import WORLD, Keys, Kind
 from lalliance_agents.wire.messages import BODY_OF, Message, encode
@@ -39,7 +39,6 @@ from mission_control.watch.story import Story
 MISSION = "synthetic"
 PERIOD = 0.2
 TASKS_OF_ONE = 12
-CHROMIUM = "/usr/bin/chromium"
 FLAGS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
     "--disable-background-networking", "--disable-component-update",
@@ -217,7 +216,7 @@ class Watcher:
 def look(address: str, seconds: float) -> list[float]:
     """Have the page open in Chromium for a while; how long each frame took that it drew, in milliseconds."""
     with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        browser = play.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
         page = browser.new_page(viewport={"width": 1440, "height": 1000})
         page.goto(address)
         page.wait_for_timeout(seconds * 1000)
@@ -326,7 +325,7 @@ def main() -> None:
     if chosen.look is not None:
         Console(soft_wrap=True, highlight=False).print_json(json.dumps(look(chosen.look, chosen.seconds)))
         return
-    if chosen.browser and not Path(CHROMIUM).exists():
+    if chosen.browser and not CHROMIUM.exists():
         raise SystemExit(f"{CHROMIUM}: no such file; expected Chromium there, or no --browser")
     rows = asyncio.run(measure(chosen))
     seen = "and a page in Chromium" if chosen.browser else "without a browser"
