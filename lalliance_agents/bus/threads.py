@@ -15,15 +15,22 @@ import threading
 MOST_THREADS = 64
 
 _ensure = ctypes.pythonapi.PyGILState_Ensure
-#: What a thread puts here is forgotten together with its state.
-_of_this_thread = threading.local()
 _kept = 0
 
 
+class _ThisThread(threading.local):
+    """What a thread puts here is forgotten together with its state."""
+
+    known = False
+
+
+this_thread = _ThisThread()
+
+
 def stay_known() -> None:
-    """Keep the thread that runs this known to Python, if that can be."""
+    """Keep the thread that runs this known to Python, if that can be; to be called while `this_thread` is not known."""
     global _kept  # noqa: PLW0603 - threads are the process's, not an object's
-    if not hasattr(_of_this_thread, "known") and _kept < MOST_THREADS:
+    if _kept < MOST_THREADS:
         _kept += 1
-        _of_this_thread.known = True
+        this_thread.known = True
         _ensure()

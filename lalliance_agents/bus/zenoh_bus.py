@@ -3,8 +3,9 @@
 Zenoh calls back in its own threads; those calls do nothing but check a size and push into the bus's one inbox, and the
 application's handlers run from there in the event loop. The callbacks are "direct" (`indirect=False`): they need no
 thread per declaration, which would lose the order between subscriptions and keep a forgotten session from letting the
-interpreter exit. When the router is gone the session reconnects and declares everything again by itself; watchers of
-presence see everybody leave and come back. A router that has been silent for two seconds counts as gone.
+interpreter exit. They come from few threads, which stay known to Python (`threads`). When the router is gone the session
+reconnects and declares everything again by itself; watchers of presence see everybody leave and come back. A router that
+has been silent for two seconds counts as gone.
 
 A bus that is never closed is closed by the interpreter's exit, or when it is garbage collected.
 """
@@ -28,7 +29,7 @@ from lalliance_agents.bus.session import (
     close_when_forgotten,
     open_session,
 )
-from lalliance_agents.bus.threads import stay_known
+from lalliance_agents.bus.threads import stay_known, this_thread
 from lalliance_agents.errors import BusError
 
 Raw = TypeVar("Raw")
@@ -227,7 +228,8 @@ class ZenohBus(QueuedBus):
         inbox = self._inbox
 
         def listen(raw: zenoh.Sample | zenoh.Query) -> None:
-            stay_known()
+            if not this_thread.known:
+                stay_known()
             payload = raw.payload
             if payload is None or inbox.admits(len(payload)):
                 inbox.push(inlet, raw)
@@ -241,7 +243,8 @@ class ZenohBus(QueuedBus):
         inbox = self._inbox
 
         def gather(reply: zenoh.Reply) -> None:
-            stay_known()
+            if not this_thread.known:
+                stay_known()
             raw = reply.ok
             if raw is not None and inbox.admits(len(raw.payload)):
                 inquiry.replies.append(Sample(str(raw.key_expr), raw.payload.to_bytes()))
