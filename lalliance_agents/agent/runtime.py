@@ -1,14 +1,15 @@
 """The robot at run time: receive, feed, tick, perform.
 
 A `Robot` puts a mind, a messenger and a body together in one event loop. Messages become events; once per control period
-the mind ticks, and its commands go to the radio and the body. Once a second the robot refreshes what others keep of it. It
-decides nothing itself, and nothing that it receives can end it: it ends when the world says that the mission is over, or
-when it is cancelled. It hears through the faults of links that the world has put in force.
+the mind ticks, or only beats where it has nothing to decide, and its commands go to the radio and the body. Once a second
+the robot refreshes what others keep of it. It decides nothing itself, and nothing that it receives can end it: it ends when
+the world says that the mission is over, or when it is cancelled. It hears through the faults of links that the world has put
+in force.
 """
 
 import asyncio
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
 from lalliance_agents.agent import translate
@@ -27,7 +28,7 @@ from lalliance_agents.errors import MissionError
 from lalliance_agents.model.events import Activate, Announce, BodyFailed, Command, Deactivate, Decision, TrialStarted
 from lalliance_agents.model.parameters import Erratum
 from lalliance_agents.wire.keys import Key, Keys, Kind
-from lalliance_agents.wire.messages import Activity, BodyState, Heartbeat, Hello, Message, TaskState
+from lalliance_agents.wire.messages import Activity, BodyState, Decoder, Heartbeat, Hello, Message, TaskState, decode_at
 
 _log = logging.getLogger(__name__)
 
@@ -38,6 +39,8 @@ MOST_TEAMMATES = 1024
 #: Time between two refreshes of the action and the report, and of the rarer greeting, in mission seconds.
 REFRESH_PERIOD = 1.0
 GREETING_PERIOD = 10.0
+#: Greetings of a whole team in a second at most: everybody hears each of them, however large the team is.
+MOST_GREETINGS = 10.0
 #: Least time between two messages with all motivations, in mission seconds.
 MOTIVATION_PERIOD = 0.2
 
@@ -56,6 +59,7 @@ class Robot:
         catalog: learned times on disk; default: nothing is stored.
         incarnation: which life of this robot this is; default: what the catalog says, else a fresh one.
         world: whether there is a world server; without one the robot begins at once and never ends by itself.
+        decode: how messages are decoded; robots of one process may share one that remembers.
 
     Raises:
         BehaviorError: the behaviour sets do not fit the mission.
@@ -73,6 +77,7 @@ class Robot:
         catalog: Catalog | None = None,
         incarnation: int | None = None,
         world: bool = True,
+        decode: Decoder = decode_at,
     ) -> None:
         if name not in mission.robots:
             raise MissionError(
@@ -92,8 +97,10 @@ class Robot:
         now = self._clock.now()
         self.mind = new_mind(mission, name, self._chance, now=now, learned=catalog.learned if catalog else None)
         self._keys = Keys(mission.name)
-        self._bus = FaultyBus(bus, self._keys, name, self._clock)
-        self._messenger = Messenger(self._bus, self._keys, name, incarnation, self._clock.now, mission.robots)
+        self._bus = FaultyBus(bus, self._keys, name, self._clock, decode=decode)
+        self._messenger = Messenger(
+            self._bus, self._keys, name, incarnation, self._clock.now, mission.robots, decode=decode
+        )
         self._reports = Reports(self._messenger, self._bus)
         self._team = Team(name, frozenset(tasks), MOST_TEAMMATES)
         for teammate in mission.teammates(name):
@@ -288,14 +295,27 @@ class Robot:
     def _tick(self, now: float) -> None:
         for one in self._repertoire.values():
             self._feel(one)
-        for command in self.mind.tick(now):
+        shown = self._shows_motivations(now)
+        for command in self._think(now, whole=shown):
             self._perform(command)
         if now >= self._refresh_due:
             self._refresh_due = now + REFRESH_PERIOD
             self._refresh(now)
-        if now >= self._motivation_due and self._motivations is not None and self._motivations.has_listeners:
-            self._motivation_due = now + MOTIVATION_PERIOD
+        if shown and self._motivations is not None:
             self._motivations.put(self._reports.motivations(self.mind))
+
+    def _think(self, now: float, *, whole: bool) -> Sequence[Command]:
+        """A control step; unless it is to be a whole one, only what is due is announced where nothing else can follow."""
+        if whole or now >= self.mind.wake() or now >= self.mind.next_lapse():
+            return self.mind.tick(now)
+        return self.mind.beat(now)
+
+    def _shows_motivations(self, now: float) -> bool:
+        """Whether all motivations are to be published after this step: it is time to look, and somebody listens."""
+        if now < self._motivation_due or self._motivations is None:
+            return False
+        self._motivation_due = now + MOTIVATION_PERIOD
+        return self._motivations.has_listeners
 
     def _perform(self, command: Command) -> None:
         match command:
@@ -324,7 +344,7 @@ class Robot:
         self._act()
         self._reports.send(self.mind, now, final=False)
         if now >= self._greeting_due:
-            self._greeting_due = now + GREETING_PERIOD
+            self._greeting_due = now + max(GREETING_PERIOD, len(self._mission.robots) / MOST_GREETINGS)
             self._greet()
         if self._catalog is not None and self.mind.knowledge.version != self._saved_version and self._saving is None:
             self._saving = asyncio.create_task(self._save())

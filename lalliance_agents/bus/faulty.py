@@ -28,7 +28,7 @@ from lalliance_agents.clock import MissionClock
 from lalliance_agents.errors import MessageError
 from lalliance_agents.faults import fits
 from lalliance_agents.wire.keys import PRESENCE, WORLD, Key, Keys, Kind
-from lalliance_agents.wire.messages import Blindness, ChaosRules, Effect, Message, decode_at
+from lalliance_agents.wire.messages import Blindness, ChaosRules, Decoder, Effect, Message, decode_at
 
 #: Reasons of drops: a link rule lost it; the robot is blind; too many delayed ones wait already.
 LOST = "link fault"
@@ -51,15 +51,17 @@ class FaultyBus(Bus):
         keys: the mission's keys.
         me: the robot, as the receiver that rules name.
         clock: mission time, in which delays are meant.
+        decode: how what comes is decoded.
     """
 
-    def __init__(self, inner: Bus, keys: Keys, me: str, clock: MissionClock) -> None:
+    def __init__(self, inner: Bus, keys: Keys, me: str, clock: MissionClock, *, decode: Decoder = decode_at) -> None:
         self._inner = inner
         self._keys = keys
         self._me = me
         self._clock = clock
         # It only listens: what it would put into its headers does not matter.
-        self._ear = Messenger(inner, keys, me, 0, clock.now)
+        self._ear = Messenger(inner, keys, me, 0, clock.now, decode=decode)
+        self._decode = decode
         self._line = DelayLine(clock)
         self._touchable = [keys.build(kind) for kind in (Kind.ACTIVITY, Kind.HEARTBEAT, Kind.SENSE_TASK)]
         self._links = LinkRules()
@@ -201,7 +203,7 @@ class FaultyBus(Bus):
                 self._deliver(found.delay, inlet, sample, WORLD)
             return
         try:
-            message = decode_at(key, sample.payload)
+            message = self._decode(key, sample.payload)
         except MessageError:  # whoever reads it will count it
             inlet.deliver(sample)
             return

@@ -21,7 +21,7 @@ from lalliance_agents.bus.drops import CUT_OFF, Drops
 from lalliance_agents.errors import MessageError
 from lalliance_agents.wire.freshness import Freshness, Newest
 from lalliance_agents.wire.keys import PRESENCE, Key, Keys, Kind
-from lalliance_agents.wire.messages import BODY_OF, Message, decode_at, encode
+from lalliance_agents.wire.messages import BODY_OF, Decoder, Message, decode_at, encode
 
 _log = logging.getLogger(__name__)
 
@@ -49,10 +49,19 @@ class Messenger:
         incarnation: which life of `me` this is.
         clock: gives mission time, in seconds.
         team: the robots that are told apart in the account of what was dropped.
+        decode: how what comes is decoded.
     """
 
     def __init__(
-        self, bus: Bus, keys: Keys, me: str, incarnation: int, clock: Callable[[], float], team: Iterable[str] = ()
+        self,
+        bus: Bus,
+        keys: Keys,
+        me: str,
+        incarnation: int,
+        clock: Callable[[], float],
+        team: Iterable[str] = (),
+        *,
+        decode: Decoder = decode_at,
     ) -> None:
         self.bus = bus
         self.keys = keys
@@ -62,6 +71,7 @@ class Messenger:
         self.received = 0
         self._drops = Drops(team)
         self._clock = clock
+        self._decode = decode
         self._presence_numbers = itertools.count(1)
         self._other_numbers = itertools.count(1)
         self._freshness = Freshness()
@@ -130,7 +140,7 @@ class Messenger:
             if key.speaker == self.me:
                 return
             source = key.speaker or sample.key
-            message = decode_at(key, sample.payload)
+            message = self._decode(key, sample.payload)
         except MessageError as error:
             self.drop(error.reason, source, str(error))
             return

@@ -34,6 +34,9 @@ from lalliance_agents.errors import BusError
 
 Raw = TypeVar("Raw")
 
+#: Keys that are declared when they are published on; beyond it each message finds its own way.
+MOST_PUBLISHERS = 2**13
+
 
 @dataclass(frozen=True, slots=True)
 class _Quality:
@@ -110,6 +113,8 @@ class ZenohBus(QueuedBus):
         # Zenoh forgets most declarations with their last reference.
         self._declared: set[_Declared] = set()
         self._inquiries: set[Inquiry] = set()
+        # A publisher knows where its messages go, and whether anywhere at all; a bare `put` looks that up each time.
+        self._publishers: dict[tuple[str, Delivery], zenoh.Publisher] = {}
         self._closed = False
         close_when_forgotten(self, session)
 
@@ -118,12 +123,21 @@ class ZenohBus(QueuedBus):
 
     def put(self, key: str, payload: bytes, delivery: Delivery) -> None:
         """Publish without waiting; lost silently while the bus is down, silently ignored once closed."""
-        check_key(key)
         if self._closed:
+            check_key(key)
             return
-        self._session.put(
-            key, payload, congestion_control=zenoh.CongestionControl.DROP, priority=_QUALITY[delivery].priority
-        )
+        publisher = self._publishers.get((key, delivery))
+        if publisher is None:
+            check_key(key)
+            priority = _QUALITY[delivery].priority
+            if len(self._publishers) >= MOST_PUBLISHERS:
+                self._session.put(key, payload, congestion_control=zenoh.CongestionControl.DROP, priority=priority)
+                return
+            publisher = self._session.declare_publisher(
+                key, congestion_control=zenoh.CongestionControl.DROP, priority=priority
+            )
+            self._publishers[key, delivery] = publisher
+        publisher.put(payload)
 
     async def publication(self, key: str, delivery: Delivery) -> "ZenohPublication":
         """Declare a key that will be published on often."""
@@ -210,6 +224,7 @@ class ZenohBus(QueuedBus):
         for inquiry in self._inquiries:
             inquiry.finish()
         await close_session(self._session)
+        self._publishers.clear()
 
     def _expression(self, pattern: str) -> zenoh.KeyExpr:
         check_pattern(pattern)
@@ -291,6 +306,16 @@ class ZenohPublication(_Declared):
     def __init__(self, publisher: zenoh.Publisher, place: "set[_Declared]") -> None:
         super().__init__(publisher, None, place)
         self._publisher = publisher
+        # To ask Zenoh each time would have it go through all subscriptions there are; it tells when that changes.
+        self._matching = False
+        self._listener = publisher.declare_matching_listener(zenoh.handlers.Callback(self._note, indirect=False))
+        # Typed as a bool, but in fact a MatchingStatus, which is always true.
+        status: Any = publisher.matching_status
+        self._note(status)
+
+    def _note(self, status: zenoh.MatchingStatus) -> None:
+        """Called by Zenoh, in its own threads, when the first listener comes or the last one goes."""
+        self._matching = status.matching
 
     def put(self, payload: bytes) -> None:
         """Publish without waiting; lost silently while the bus is down, silently ignored once closed."""
@@ -300,11 +325,7 @@ class ZenohPublication(_Declared):
     @property
     def has_listeners(self) -> bool:
         """Whether somebody subscribes to this key just now, as far as is known; nobody does while the bus is down."""
-        if self not in self._place:
-            return False
-        # Typed as a bool, but in fact a MatchingStatus, which is always true.
-        status: Any = self._publisher.matching_status
-        return bool(getattr(status, "matching", status))
+        return self._matching and self in self._place
 
 
 def _reply(query: zenoh.Query, handler: Answer) -> None:

@@ -8,6 +8,7 @@ text is one short line; telling what is wrong with a large message takes hardly 
 message claims to hold takes no room before it is there.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Any, Literal, TypeVar
 
 import msgpack
@@ -307,6 +308,8 @@ BODY_OF: dict[Kind, type[Message]] = {
 }
 
 M = TypeVar("M", bound=Message)
+#: Decodes what came on a key, as `decode_at` does.
+Decoder = Callable[[Key, bytes], Message]
 
 
 def encode(message: Message) -> bytes:
