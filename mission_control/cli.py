@@ -24,6 +24,7 @@ from mission_control.chaos import chaos
 from mission_control.dashboard.command import PORT, Port, dashboard
 from mission_control.deploy.deploy_command import deploy
 from mission_control.deploy.keys_command import keys as keys_command
+from mission_control.hosting import check_shareable
 from mission_control.keeping import tell
 from mission_control.record_command import bag, check_extra, new_recording, record, replay
 from mission_control.shell import (
@@ -101,6 +102,9 @@ def run(
         bool, typer.Option("--dashboard", help="Show it as a web page too; on a terminal the page stays until Ctrl-C.")
     ] = False,
     port: Port = PORT,
+    processes: Annotated[
+        int | None, typer.Option(min=1, help="Processes that the robots share; default: each robot has its own.")
+    ] = None,
     plain: Annotated[bool, typer.Option("--plain", help="One line per event instead of the live view.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -119,6 +123,10 @@ def run(
     if connect is not None and listen is not None:
         raise UserError("--connect uses a router that runs already, --listen starts one; expected one of the two")
     mission = load_part(path, seed, part="team")
+    if processes is not None and processes >= len(mission.robots):
+        processes = None
+    if processes is not None:
+        check_shareable(path, mission, keys)
     console = Console(stderr=as_json)
     if learned is not None:
         from lalliance_agents.agent.catalog import prepare
@@ -139,7 +147,7 @@ def run(
     def plan(kept: Path) -> Plan:
         own, shown = (None if folder is None else folder.resolve() for folder in (learned, keys))
         beginning = Beginning.of(recall(kept, mission))
-        return Plan(path.resolve(), mission, kept.resolve(), beginning, speed, connect, listen, own, shown)
+        return Plan(path.resolve(), mission, kept.resolve(), beginning, speed, connect, listen, own, shown, processes)
 
     async def launch(kept: Path) -> dict[str, Any]:
         async with page or contextlib.nullcontext():

@@ -1,4 +1,4 @@
-"""Run a mission on this machine: a router, a world server and one process per robot, and their end.
+"""Run a mission on this machine: a router, a world server and the robots, each in a process of its own or several in one.
 
 The launcher starts the processes, has the world's orders carried out at them, starts its router and its world server again if
 they die, shows what happens, and leaves no process behind. It takes no part in the mission: robots and world talk to one
@@ -8,7 +8,7 @@ another alone.
 import asyncio
 import contextlib
 import signal
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -23,6 +23,7 @@ from lalliance_agents.config import Mission
 from lalliance_agents.errors import BusError, UserError
 from lalliance_agents.wire.keys import LAUNCHER, OPERATOR, WORLD, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message, Status
+from mission_control.hosting import shares
 from mission_control.keeper import Keeper, LaunchError, View
 from mission_control.orders import Orders
 from mission_control.processes import GRACE, Child
@@ -93,6 +94,7 @@ class Plan:
         listen: where a router of our own listens; None: a free port on this machine.
         learned: the folder of learned times; None: nothing is stored.
         keys: the folder of the team's keys, which have been checked; None: the bus asks for none.
+        processes: how many processes the robots share; None: each has one of its own.
     """
 
     path: Path
@@ -104,6 +106,7 @@ class Plan:
     listen: str | None = None
     learned: Path | None = None
     keys: Path | None = None
+    processes: int | None = None
 
     @classmethod
     def kept_in(cls, folder: Path, path: Path, mission: Mission, **options: Any) -> "Plan":
@@ -128,11 +131,13 @@ class Plan:
         """Arguments of every process of the mission but the router's."""
         return ["--connect", endpoint, "--speed", repr(self.speed), "--seed", str(self.mission.seed), *self.shown()]
 
-    def robot(self, name: str, incarnation: int, endpoint: str) -> list[str]:
-        """Arguments of a robot's process."""
-        learned = [] if self.learned is None else ["--learned", str(self.learned)]
-        life = [] if self.learned is not None else ["--incarnation", str(incarnation)]
-        return ["robot", str(self.path), "--name", name, *self.common(endpoint), *learned, *life]
+    def robots(self, lives: Mapping[str, int], endpoint: str) -> list[str]:
+        """Arguments of the process of a robot, or of several, each in one of its lives."""
+        names = [word for name in lives for word in ("--name", name)]
+        kept = [word for life in lives.values() for word in ("--incarnation", str(life))]
+        if self.learned is not None:
+            kept = ["--learned", str(self.learned)]
+        return ["robot", str(self.path), *names, *self.common(endpoint), *kept]
 
     def world(self, endpoint: str) -> list[str]:
         """Arguments of the world server's process."""
@@ -167,7 +172,9 @@ class Launcher:
         self._lives = dict(plan.beginning.lives)
         self._world = Keeper(plan.world(self._endpoint), plan.first_world(), view, self._on_line)
         self._messenger: Messenger | None = None
-        self._orders = Orders(plan.mission, self._robots, self._restart, self._report)
+        # What strikes a process that several share would strike all of them: nobody here makes that.
+        reached = {} if plan.processes else self._robots
+        self._orders = Orders(plan.mission, reached, self._restart, self._report)
         self._orders.may_return |= plan.beginning.may_return
         self._tasks: set[asyncio.Task[None]] = set()
         self._robot_ended = asyncio.Event()
@@ -228,7 +235,7 @@ class Launcher:
     async def _conduct(self, bus: Bus) -> dict[str, Any]:
         messenger = await self._watch(bus)
         await self._world.start()
-        await asyncio.gather(*(self._start_robot(name) for name in self._plan.beginning.first))
+        await asyncio.gather(*map(self._start_robots, shares(self._plan.beginning.first, self._plan.processes)))
         summary = await self._await_end()
         await self._await_robots()
         await messenger.close()
@@ -239,7 +246,8 @@ class Launcher:
         messenger = self._messenger = Messenger(bus, keys, LAUNCHER, 1, self._clock.now)
         for kind in (Kind.EVENT, Kind.STATUS, Kind.DECISION, Kind.MOTIVATION):
             await messenger.listen(keys.build(kind), self._take)
-        await bus.announce_presence(keys.build(Kind.LAUNCHER))
+        if not self._plan.processes:
+            await bus.announce_presence(keys.build(Kind.LAUNCHER))
         return messenger
 
     def _take(self, _: Key, message: Message) -> None:
@@ -252,7 +260,7 @@ class Launcher:
         self._view.take(message, self._clock.now())
 
     def _restart(self, robot: str) -> None:
-        self._spawn(self._start_robot(robot))
+        self._spawn(self._start_robots([robot]))
 
     def _report(self, order: int) -> None:
         if self._messenger is not None:
@@ -263,11 +271,15 @@ class Launcher:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _start_robot(self, name: str) -> None:
-        self._lives[name] = self._lives.get(name, 0) + 1
-        child = await Child.start(name, self._plan.robot(name, self._lives[name], self._endpoint), self._on_line)
-        self._robots[name] = child
-        self._orders.returned(name)
+    async def _start_robots(self, names: Sequence[str]) -> None:
+        """Start robots, in a process that is theirs."""
+        lives = {name: self._lives.get(name, 0) + 1 for name in names}
+        self._lives |= lives
+        called = names[0] if len(names) == 1 else f"{names[0]}..{names[-1]}"
+        child = await Child.start(called, self._plan.robots(lives, self._endpoint), self._on_line)
+        for name in names:
+            self._robots[name] = child
+            self._orders.returned(name)
         self._spawn(self._observe(child))
 
     async def _observe(self, child: Child) -> None:
@@ -342,7 +354,7 @@ class Launcher:
 
     async def _await_robots(self) -> None:
         """Robots end by themselves when the mission is over, but for those that are stopped."""
-        going = [child.wait() for child in self._robots.values() if not child.stopped]
+        going = [child.wait() for child in set(self._robots.values()) if not child.stopped]
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(2 * GRACE):
                 await asyncio.gather(*going)
@@ -350,6 +362,6 @@ class Launcher:
     async def _end_all(self) -> None:
         for task in list(self._tasks):
             task.cancel()
-        await asyncio.gather(self._world.end(), *(child.end() for child in self._robots.values()))
+        await asyncio.gather(self._world.end(), *(child.end() for child in set(self._robots.values())))
         if self._router is not None:
             await self._router.end(grace=ROUTER_GRACE)

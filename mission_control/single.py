@@ -1,18 +1,20 @@
-"""The single processes of a mission, each a command of its own: the router, the world server, a robot, a look at their health.
+"""The single processes of a mission, each a command of its own: the router, the world server, robots, a look at their health.
 
 `lalliance run` starts the same commands; here they are for several machines, and for deployments that start them.
 """
 
 import asyncio
 import contextlib
+import gc
 import logging
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lalliance_agents.errors import UserError
+from mission_control.hosting import check_certificate, named, told
 from mission_control.keeping import check_place, keep, kept_summary, tell
 from mission_control.shell import (
     AsJson,
@@ -27,6 +29,9 @@ from mission_control.shell import (
     load_part,
     run_until_told,
 )
+
+if TYPE_CHECKING:
+    from lalliance_agents.agent.runtime import Outcome
 
 Connect = Annotated[
     str | None,
@@ -136,7 +141,14 @@ def world(
 
 def robot(
     path: MissionPath,
-    name: Annotated[str, typer.Option(help="Which robot of the mission.", show_default=False)],
+    names: Annotated[
+        list[str],
+        typer.Option(
+            "--name",
+            help="Which robot of the mission; may be repeated, and be a glob: all these robots live in this process.",
+            show_default=False,
+        ),
+    ],
     connect: Connect = None,
     connect_timeout: ConnectTimeout = 5.0,
     keys: Keys = None,
@@ -147,46 +159,58 @@ def robot(
         typer.Option(metavar="MODULE:FACTORY", help="Behaviour sets of your own; default: what the mission says."),
     ] = None,
     learned: Learned = None,
-    incarnation: Annotated[
-        int | None, typer.Option(min=0, hidden=True, help="Which life of the robot this is.")
+    incarnations: Annotated[
+        list[int] | None, typer.Option("--incarnation", min=0, hidden=True, help="Which life of each robot this is.")
     ] = None,
     without_world: Annotated[bool, typer.Option("--without-world", help="There is no world server.")] = False,
     parent: Parent = None,
 ) -> None:
-    """Run one robot of a mission until the mission is over."""
+    """Run one robot of a mission, or several in one process, until the mission is over."""
     follow(parent)
     mission = load_part(path, seed, part="robot")
-    if name not in mission.robots:
-        raise UserError(f"{path}: no robot {name!r} in this mission; expected one of {', '.join(mission.robots)}")
+    chosen = named(path, mission, names)
+    check_certificate(chosen, keys)
+    if incarnations and len(incarnations) != len(chosen):
+        raise UserError(f"--incarnation was given {len(incarnations)} times; expected once for each of {told(chosen)}")
+    lives = dict(zip(chosen, incarnations or [], strict=False))
 
-    async def live() -> str:
+    def options(name: str) -> dict[str, Any]:
         from lalliance_agents.agent.behavior import load_behaviors
         from lalliance_agents.agent.catalog import Catalog
+
+        place = behaviors or mission.robots[name].behaviors
+        return {
+            "behaviors": load_behaviors(place) if place else [],
+            "catalog": None if learned is None else Catalog(learned, name),
+            "incarnation": lives.get(name),
+            "world": not without_world,
+        }
+
+    async def live() -> "list[Outcome]":
+        from lalliance_agents.agent.host import Host
         from lalliance_agents.agent.runtime import Robot
         from lalliance_agents.bus.zenoh_bus import open_bus
         from lalliance_agents.clock import MissionClock
 
-        place = behaviors or mission.robots[name].behaviors
-        sets = load_behaviors(place) if place else []
-        catalog = None if learned is None else Catalog(learned, name)
-        shown, endpoint = credentials_from(keys, name), endpoint_of(connect, keys)
+        made = {name: options(name) for name in chosen}
+        shown, endpoint = credentials_from(keys, chosen[0]), endpoint_of(connect, keys)
         async with await open_bus(endpoint, timeout=connect_timeout, credentials=shown) as bus:
             if parent is None:
-                typer.echo(f"robot {name} of mission {mission.name} is connected to {endpoint}")
-            member = Robot(
-                mission,
-                name,
-                bus=bus,
-                behaviors=sets,
-                clock=MissionClock(speed),
-                catalog=catalog,
-                incarnation=incarnation,
-                world=not without_world,
-            )
-            return await member.run()
+                are = "is" if len(chosen) == 1 else "are"
+                typer.echo(f"{told(chosen)} of mission {mission.name} {are} connected to {endpoint}")
+            clock = MissionClock(speed)
+            if len(chosen) == 1:
+                member = Robot(mission, chosen[0], bus=bus, clock=clock, **made[chosen[0]])
+                _keep_all()
+                return [await member.run()]
+            async with Host(mission, bus) as host:
+                for name, how in made.items():
+                    host.take_in(name, clock=clock, **how)
+                _keep_all()
+                return await host.run()
 
-    outcome = run_until_told(live())
-    raise typer.Exit(0 if outcome == "complete" else 1)
+    outcomes = run_until_told(live())
+    raise typer.Exit(0 if set(outcomes) == {"complete"} else 1)
 
 
 def health(
@@ -235,3 +259,9 @@ def _show_events() -> None:
     events.addHandler(lines)
     events.setLevel(logging.INFO)
     events.propagate = False
+
+
+def _keep_all() -> None:
+    """What is there now stays: to look through it for garbage later on would hold the robots up."""
+    gc.collect()
+    gc.freeze()

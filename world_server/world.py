@@ -245,7 +245,7 @@ class World:
         if isinstance(fault, Crash | Hang) and not self.has_launcher:
             raise UserError(
                 f"{describe(fault)}: nobody here can reach the robots' processes; expected a mission started by "
-                "`lalliance run`, or a fault of another kind"
+                "`lalliance run` with one process per robot, or a fault of another kind"
             )
         if isinstance(fault, Crash | Hang) and fault.robot in self.bodies and not self.bodies[fault.robot].present:
             raise UserError(f"{describe(fault)}: {fault.robot} is not there; expected a robot whose process runs")

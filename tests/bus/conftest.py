@@ -1,4 +1,4 @@
-"""The buses under test: an in-memory hub, bare and through faults that hit nothing, and a router with real sessions.
+"""The buses under test: an in-memory hub, bare, shared and through faults that hit nothing, and a router with real sessions.
 
 A `Team` makes participants and closes what a test leaves open. `mortal` is a participant that announces a presence and can
 be killed without a goodbye: on the real bus that is a process of its own. Nothing here sleeps for a fixed time; `eventually`
@@ -20,6 +20,7 @@ from lalliance_agents.bus.faulty import FaultyBus
 from lalliance_agents.bus.link import LinkRules
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.router import free_endpoint, open_router
+from lalliance_agents.bus.shared import SharedBus
 from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.wire.keys import Keys
@@ -132,6 +133,28 @@ class FaultyTeam(MemoryTeam):
         return await self._stack.enter_async_context(FaultyMemoryBus(MemoryBus(self._hub)))
 
 
+class SharedMemoryBus(SharedBus):
+    """A memory bus that others could share, with some of what is subscribed to served by wider subscriptions."""
+
+    def __init__(self, inner: MemoryBus) -> None:
+        super().__init__(inner)
+        self._memory = inner
+        self.widen(["m/*", "m/a/*", "m/@chaos/*"])
+
+    @property
+    def dropped_overflow(self) -> int:
+        return self._memory.dropped_overflow
+
+    @property
+    def dropped_oversize(self) -> int:
+        return self._memory.dropped_oversize
+
+
+class SharedTeam(MemoryTeam):
+    async def bus(self) -> Bus:
+        return await self._stack.enter_async_context(SharedMemoryBus(MemoryBus(self._hub)))
+
+
 class ZenohTeam:
     def __init__(self, stack: AsyncExitStack, endpoint: str) -> None:
         self._stack = stack
@@ -192,13 +215,15 @@ class Watch:
                 await self._grown.wait()
 
 
-@pytest.fixture(params=["memory", "faulty", "zenoh"])
+@pytest.fixture(params=["memory", "faulty", "shared", "zenoh"])
 async def team(request: pytest.FixtureRequest) -> AsyncIterator[MemoryTeam | ZenohTeam]:
     async with AsyncExitStack() as stack:
         if request.param == "memory":
             yield MemoryTeam(stack)
         elif request.param == "faulty":
             yield FaultyTeam(stack)
+        elif request.param == "shared":
+            yield SharedTeam(stack)
         else:
             router = await stack.enter_async_context(await open_router(free_endpoint()))
             yield ZenohTeam(stack, router.endpoint)

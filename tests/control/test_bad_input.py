@@ -104,11 +104,27 @@ COMMANDS = {
         ["robot", "good.yaml", "--name", "one", "--behaviors", "no_such_module:make"],
         "behaviors 'no_such_module:make' cannot be loaded: ModuleNotFoundError",
     ),
+    "a glob that names no robot": (
+        ["robot", "good.yaml", "--name", "one", "--name", "th*"],
+        "good.yaml: no robot 'th*' in this mission; expected one of one, two",
+    ),
+    "several robots with the keys of one": (
+        ["robot", "good.yaml", "--name", "*", "--keys", "keys"],
+        "--keys keys: robots one, two would share one connection, and a certificate speaks for one robot alone; expected ",
+    ),
+    "robots with keys that share a process": (
+        ["run", "good.yaml", "--processes", "1", "--keys", "keys"],
+        "--keys keys: robots one, two would share one connection, and a certificate speaks for one robot alone; expected ",
+    ),
     "learned times where there is no folder": (
         ["run", "good.yaml", "--learned", "good.yaml"],
         "good.yaml: learned times cannot be stored here (File exists); expected a folder that can be written to",
     ),
     "an empty endpoint": (["run", "good.yaml", "--connect", ""], "'' is not an endpoint"),
+    "a crash of a process that others share": (
+        ["run", "crash.yaml", "--processes", "1"],
+        "crash.yaml: faults.0: crash of one would strike all robots of a process that several share; expected no crash ",
+    ),
     "an endpoint that is none": (["router", "--listen", "nonsense"], "'nonsense' is not an endpoint"),
     "a router to use and one to start": (
         ["run", "good.yaml", "--connect", "tcp/127.0.0.1:1", "--listen", "tcp/127.0.0.1:2"],
@@ -121,6 +137,7 @@ COMMANDS = {
 def test_a_bad_command_is_refused(processes: Processes, case: str) -> None:
     arguments, sentence = COMMANDS[case]
     (processes.folder / "good.yaml").write_text(GOOD)
+    (processes.folder / "crash.yaml").write_text(GOOD + "faults: [{at: 3, robot: one, kind: crash}]\n")
     done = processes.run(*arguments)
     assert done.returncode == 2
     assert done.stdout == ""

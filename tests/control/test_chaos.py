@@ -90,7 +90,7 @@ def test_without_a_launcher_bodies_can_fail_and_processes_cannot(processes: Proc
         assert (done.returncode, done.stdout) == (2, "")
         assert done.stderr == (
             f"lalliance: {kind} of left: nobody here can reach the robots' processes; expected a mission started by "
-            "`lalliance run`, or a fault of another kind\n"
+            "`lalliance run` with one process per robot, or a fault of another kind\n"
         )
     for robot in ("left", "right"):
         said = processes.chaos("pair.yaml", "inject", "kind=stuck", f"robot={robot}", "--connect", endpoint)
