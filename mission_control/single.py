@@ -189,9 +189,11 @@ def robot(
     async def live() -> "list[Outcome]":
         from lalliance_agents.agent.host import Host
         from lalliance_agents.agent.runtime import Robot
+        from lalliance_agents.bus.session import receive_in_one_thread
         from lalliance_agents.bus.zenoh_bus import open_bus
         from lalliance_agents.clock import MissionClock
 
+        receive_in_one_thread()
         made = {name: options(name) for name in chosen}
         shown, endpoint = credentials_from(keys, chosen[0]), endpoint_of(connect, keys)
         async with await open_bus(endpoint, timeout=connect_timeout, credentials=shown) as bus:

@@ -10,6 +10,7 @@ import asyncio
 import atexit
 import contextlib
 import json
+import os
 import re
 import threading
 import weakref
@@ -105,6 +106,14 @@ def _let_threads_end() -> None:
     """Wait a little for what still goes on in Zenoh: a thread that returns into an ending interpreter aborts the process."""
     for thread in list(_threads):
         thread.join(CLOSE_LIMIT)
+
+
+def receive_in_one_thread() -> None:
+    """Have Zenoh receive in one thread in this process; without that each message wakes two. Before the first session.
+
+    Who has said otherwise in the environment is heeded.
+    """
+    os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 1))")
 
 
 async def open_session(settings: dict[str, Any]) -> zenoh.Session:
