@@ -23,7 +23,7 @@ def hold(endpoint: str, lease: float, key: str) -> None:
     with zenoh.open(zenoh.Config.from_json5(json.dumps(settings))) as session:
         token = session.liveliness().declare_token(key)
         signal.pause()
-        token.undeclare()
+        del token
 
 
 if __name__ == "__main__":
