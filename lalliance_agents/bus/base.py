@@ -39,6 +39,7 @@ class Delivery(StrEnum):
 Handler = Callable[[Sample], None]
 Answer = Callable[[Sample], list[Sample]]
 PresenceHandler = Callable[[str, bool], None]
+ConnectionHandler = Callable[[bool], None]
 
 
 class Registration(Protocol):
@@ -113,4 +114,12 @@ class Bus(Closing):
 
         Several announcements of one key are one presence, gone with the last; a watcher that is itself one of the
         announcers may see it flicker meanwhile. While the bus is down, all are gone.
+        """
+
+    @abstractmethod
+    async def watch_connection(self, handler: ConnectionHandler) -> Registration:
+        """Have `handler` called with True if the bus is up, or once it is, with False when it goes down, and so on.
+
+        What comes after its return is handed on after that was told. A bus that goes down without a word is noticed after
+        the `LEASE`.
         """

@@ -17,7 +17,17 @@ all was received or dropped, but for second copies, which count as messages, and
 import asyncio
 from collections import Counter
 
-from lalliance_agents.bus.base import Answer, Bus, Delivery, Handler, PresenceHandler, Publication, Registration, Sample
+from lalliance_agents.bus.base import (
+    Answer,
+    Bus,
+    ConnectionHandler,
+    Delivery,
+    Handler,
+    PresenceHandler,
+    Publication,
+    Registration,
+    Sample,
+)
 from lalliance_agents.bus.delay_line import DelayLine
 from lalliance_agents.bus.drops import OTHERS
 from lalliance_agents.bus.inbox import Inlet
@@ -154,6 +164,10 @@ class FaultyBus(Bus):
     async def watch_presence(self, pattern: str, handler: PresenceHandler) -> Registration:
         """Have `handler` called with (key, True) for each presence there is or comes, and (key, False) when it is gone."""
         return await self._inner.watch_presence(pattern, handler)
+
+    async def watch_connection(self, handler: ConnectionHandler) -> Registration:
+        """Have `handler` called with whether the bus is up: now, and whenever that changes."""
+        return await self._inner.watch_connection(handler)
 
     async def close(self) -> None:
         """Discard what is under way and close the inner bus; a second call does nothing."""

@@ -2,14 +2,14 @@
 
 It behaves as the real bus does, so far as its interface promises: handlers are called later, never inside `put`; a
 participant hears itself; floods and oversize payloads are dropped and counted on the receiving side. What it does not
-have is distance: no message is delayed, lost on the way or reordered, and the hub never goes down.
+have is distance: no message is delayed, lost on the way or reordered, and the hub goes down only where a test wants it to.
 """
 
 import asyncio
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from lalliance_agents.bus.base import Answer, Delivery, Handler, PresenceHandler, Sample
+from lalliance_agents.bus.base import Answer, ConnectionHandler, Delivery, Handler, PresenceHandler, Sample
 from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, QueuedBus, answers, check_timeout
 from lalliance_agents.bus.patterns import check_key, check_pattern, intersects, matches
 
@@ -24,24 +24,47 @@ class MemoryHub:
         self._answerers: list[_Declared[_Ask]] = []
         self._watchers: list[_Declared[tuple[str, bool]]] = []
         self._presences: list[_Presence] = []
+        self._connections: list[_Declared[bool]] = []
+        self._is_up = True
 
     def __repr__(self) -> str:
         return f"<memory hub, {len(self._subscriptions)} subscriptions, {len(self._presences)} present>"
 
+    def go_down(self) -> None:
+        """Be away as a killed router is: nobody hears anybody."""
+        if self._is_up:
+            for key in dict.fromkeys(each.key for each in self._presences):
+                self._tell(key, False)
+            self._turn(False)
+
+    def come_back(self) -> None:
+        """Be there again as a router is that was started again: all that was declared holds."""
+        if not self._is_up:
+            self._turn(True)
+            for key in dict.fromkeys(each.key for each in self._presences):
+                self._tell(key, True)
+
+    def _turn(self, is_up: bool) -> None:
+        self._is_up = is_up
+        for each in self._connections:
+            each.owner._inbox.push(each.inlet, is_up)
+
     def _heard(self, key: str) -> bool:
-        return any(matches(each.pattern, key) for each in self._subscriptions)
+        return self._is_up and any(matches(each.pattern, key) for each in self._subscriptions)
 
     def _is_present(self, key: str) -> bool:
         return any(each.key == key for each in self._presences)
 
     def _tell(self, key: str, present: bool) -> None:
         for each in self._watchers:
-            if matches(each.pattern, key):
+            if self._is_up and matches(each.pattern, key):
                 each.owner._inbox.push(each.inlet, (key, present))
 
     def _forget(self, bus: "MemoryBus") -> None:
-        declared: list[_Declared[Sample] | _Declared[_Ask] | _Declared[tuple[str, bool]] | _Presence] = []
-        declared += [*self._subscriptions, *self._answerers, *self._watchers, *self._presences]
+        declared: list[
+            _Declared[Sample] | _Declared[_Ask] | _Declared[tuple[str, bool]] | _Declared[bool] | _Presence
+        ] = []
+        declared += [*self._subscriptions, *self._answerers, *self._watchers, *self._connections, *self._presences]
         for each in declared:
             if each.owner is bus:
                 each.end()
@@ -62,7 +85,7 @@ class MemoryBus(QueuedBus):
     def put(self, key: str, payload: bytes, delivery: Delivery) -> None:  # noqa: ARG002 - all are equally urgent here
         """Publish without waiting; silently ignored once closed."""
         check_key(key)
-        if self._closed:
+        if self._closed or not self._hub._is_up:
             return
         sample = Sample(key, payload)
         for each in self._hub._subscriptions:
@@ -92,7 +115,7 @@ class MemoryBus(QueuedBus):
         check_pattern(pattern)
         check_timeout(timeout)
         asked = [each for each in self._hub._answerers if intersects(each.pattern, pattern)]
-        if self._closed or not asked:
+        if self._closed or not self._hub._is_up or not asked:
             return []
         inquiry = Inquiry()
         question = _Question(self._inbox, inquiry, len(asked))
@@ -119,9 +142,17 @@ class MemoryBus(QueuedBus):
         self._check(pattern)
         inlet: Inlet[tuple[str, bool]] = Inlet(f"the watch on {pattern!r}", lambda news: handler(*news), keep=True)
         for key in dict.fromkeys(each.key for each in self._hub._presences):
-            if matches(pattern, key):
+            if self._hub._is_up and matches(pattern, key):
                 self._inbox.push(inlet, (key, True))
         return _Declared(self, pattern, inlet, self._hub._watchers)
+
+    async def watch_connection(self, handler: ConnectionHandler) -> "_Declared[bool]":
+        """Have `handler` called with whether the hub is up: now if it is, and whenever that changes."""
+        self._check_open()
+        inlet: Inlet[bool] = Inlet("the watch on the connection", handler, keep=True)
+        if self._hub._is_up:
+            self._inbox.push(inlet, True)
+        return _Declared(self, "**", inlet, self._hub._connections)
 
     async def close(self) -> None:
         """Leave the bus; a second call does nothing."""

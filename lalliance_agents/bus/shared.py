@@ -15,7 +15,17 @@ import asyncio
 from collections.abc import Iterable
 from itertools import product
 
-from lalliance_agents.bus.base import Answer, Bus, Delivery, Handler, PresenceHandler, Publication, Registration, Sample
+from lalliance_agents.bus.base import (
+    Answer,
+    Bus,
+    ConnectionHandler,
+    Delivery,
+    Handler,
+    PresenceHandler,
+    Publication,
+    Registration,
+    Sample,
+)
 from lalliance_agents.bus.inbox import Inlet
 from lalliance_agents.bus.patterns import check_pattern
 
@@ -87,6 +97,10 @@ class SharedBus(Bus):
     async def watch_presence(self, pattern: str, handler: PresenceHandler) -> Registration:
         """Have `handler` called with (key, True) for each presence there is or comes, and (key, False) when it is gone."""
         return await self._inner.watch_presence(pattern, handler)
+
+    async def watch_connection(self, handler: ConnectionHandler) -> Registration:
+        """Have `handler` called with whether the bus is up: now if it is, and whenever that changes."""
+        return await self._inner.watch_connection(handler)
 
     async def close(self) -> None:
         """Close the inner bus; a second call does nothing."""

@@ -18,7 +18,7 @@ from typing import Any, Protocol, TypeVar
 
 import zenoh
 
-from lalliance_agents.bus.base import Answer, Delivery, Handler, PresenceHandler, Sample
+from lalliance_agents.bus.base import Answer, ConnectionHandler, Delivery, Handler, PresenceHandler, Sample
 from lalliance_agents.bus.credentials import Credentials, check_fits
 from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, QueuedBus, answers, check_timeout
 from lalliance_agents.bus.patterns import check_key, check_pattern
@@ -212,6 +212,22 @@ class ZenohBus(QueuedBus):
         inlet = Inlet(f"the watch on {pattern!r}", note, keep=True)
         watch = self._session.liveliness().declare_subscriber(expression, self._listener(inlet), history=True)
         return self._declare(inlet, watch)
+
+    async def watch_connection(self, handler: ConnectionHandler) -> "_Declared":
+        """Have `handler` called with whether the router is reached: now if it is, and whenever that changes."""
+        self._check_open()
+        inlet: Inlet[zenoh.TransportEvent] = Inlet(
+            "the watch on the connection", lambda raw: handler(raw.kind == zenoh.SampleKind.PUT), keep=True
+        )
+        inbox = self._inbox
+
+        def listen(raw: zenoh.TransportEvent) -> None:
+            if not this_thread.known:
+                stay_known()
+            inbox.push(inlet, raw)
+
+        listener = zenoh.handlers.Callback(listen, indirect=False)
+        return self._declare(inlet, self._session.info.declare_transport_events_listener(listener, history=True))
 
     async def close(self) -> None:
         """Leave the bus; a second call does nothing. Cancelled, the bus still closes."""

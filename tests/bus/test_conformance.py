@@ -143,6 +143,18 @@ async def test_nothing_is_delivered_after_unsubscribing(team, make_ear):
     assert gone.samples == []
 
 
+async def test_that_the_bus_is_up_is_told_at_once_and_nothing_after_unsubscribing(team, eventually):
+    bus, told = await team.bus(), []
+    watch = await bus.watch_connection(told.append)
+    await eventually(lambda: told)
+    await watch.close()
+    await watch.close()
+    await bus.close()
+    assert told == [True]
+    with pytest.raises(RuntimeError, match="closed"):
+        await bus.watch_connection(told.append)
+
+
 async def test_a_handler_may_unsubscribe_itself(team, make_ear):
     bus = await team.bus()
     ear, once, closing = make_ear(), make_ear(), []

@@ -20,12 +20,13 @@ TIMEOUT = 20.0
 
 
 async def test_all_works_again_after_the_router_was_killed_and_came_back(run_router, eventually):
-    endpoint, heard, news = free_endpoint(), [], []
+    endpoint, heard, news, reached = free_endpoint(), [], [], []
     router = await run_router(endpoint)
     async with await open_bus(endpoint, timeout=1.0) as left, await open_bus(endpoint, timeout=1.0) as right:
         await right.subscribe("m/k", heard.append)
         await right.answer("m/q", lambda _: [Sample("m/q", b"yes")])
         await right.watch_presence("m/alive/*", lambda *change: news.append(change))
+        await right.watch_connection(reached.append)
         publication = await left.publication("m/k", Delivery.STATE)
         await left.announce_presence("m/alive/r1")
         await eventually(lambda: publication.has_listeners and news == [("m/alive/r1", True)])
@@ -49,6 +50,7 @@ async def test_all_works_again_after_the_router_was_killed_and_came_back(run_rou
 
         await eventually(answered)
     assert news[3:] == []
+    assert reached == [True, False, True]
 
 
 async def test_what_is_declared_without_a_router_works_once_there_is_one(run_router, eventually):
