@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from lalliance_agents.bus.faulty import LOST
 from lalliance_agents.wire.messages import LinkReport
-from mission_control.watch.story import RobotSeen, Story
+from mission_control.watch.seen import RobotSeen
+from mission_control.watch.story import Story
 
 
 class Row(NamedTuple):

@@ -12,6 +12,7 @@ from lalliance_agents.clock import MissionClock
 from lalliance_agents.errors import MessageError
 from lalliance_agents.wire.keys import Keys
 from mission_control.reach import reached
+from mission_control.watch.absence import told_of_absence
 from mission_control.watch.onlooker import Onlooker
 from mission_control.watch.patterns import whole_pattern
 from mission_control.watch.sighting import Sighting, read
@@ -31,7 +32,10 @@ async def echo(
     """
     async with reached(mission, connect, keys) as there:
         only = whole_pattern(pattern, there.mission)
-        async with Onlooker(there.bus, there.mission, MissionClock(), motivations=False, only=only) as onlooker:
+        async with (
+            Onlooker(there.bus, there.mission, MissionClock(), motivations=False, only=only) as onlooker,
+            told_of_absence(onlooker, there.endpoint),
+        ):
             async for sighting in onlooker:
                 document = plain(sighting, Keys(there.mission))
                 typer.echo(json.dumps(document) if as_json else "\n".join([*lines(document), "---"]))

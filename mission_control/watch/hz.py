@@ -9,6 +9,7 @@ import typer
 
 from lalliance_agents.clock import MissionClock
 from mission_control.reach import reached
+from mission_control.watch.absence import told_of_absence
 from mission_control.watch.onlooker import Onlooker
 from mission_control.watch.patterns import whole_pattern
 from mission_control.watch.rates import Arrivals
@@ -83,7 +84,10 @@ async def hz(
         only = whole_pattern(pattern, there.mission)
         meter = Meter(f"lalliance/{there.mission}/", window)
         clock = MissionClock()
-        async with Onlooker(there.bus, there.mission, clock, motivations=False, only=only, asks=False) as onlooker:
+        async with (
+            Onlooker(there.bus, there.mission, clock, motivations=False, only=only, asks=False) as onlooker,
+            told_of_absence(onlooker, there.endpoint),
+        ):
 
             async def listen() -> None:
                 async for sighting in onlooker:

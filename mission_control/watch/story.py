@@ -4,13 +4,14 @@ A story takes one sighting after the other and believes the freshest message of 
 the past is limited, whatever comes: the latest of all that happened and of all attempts. Instants are seconds since the trial
 began, of the world's clock as far as it is known; only what is said to be of the onlooker's clock is of that.
 
-An attempt is one bar of a timeline: a robot on a task, from when to when. Decisions say when it begins and ends and why;
-where one was missed, what the robot announces tells that it is on a task, or idle, and its presence that it is not there.
+Decisions say when an attempt begins and ends and why; where one was missed, what the robot announces tells that it is on a
+task, or idle, and its presence that it is not there. An event or a decision that comes after a newer one, as it may after a
+time in which nothing could be heard, is one of those that happened; what holds now is not changed by it.
 """
 
-from collections import Counter, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Container
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 from lalliance_agents.errors import MessageError
@@ -27,11 +28,11 @@ from lalliance_agents.wire.messages import (
     LinkReport,
     Message,
     Motivations,
-    Scalars,
     Status,
     TaskState,
 )
 from mission_control.watch.happened import Happened, of_decision, of_event
+from mission_control.watch.seen import LOST, NEW_TRIAL, OVER, Attempt, RobotSeen, TaskSeen, number
 from mission_control.watch.sighting import Sighting, read
 
 #: Kept of what happened, and of attempts: the latest.
@@ -45,82 +46,6 @@ MOST_NAMES = 1024
 MOST_AT_ONCE = 64
 #: How far what a robot says may be ahead of the world's time, in seconds: a fast mission can be ahead of who looks on.
 MOST_AHEAD = 600.0
-
-#: How an attempt ended that no decision ended: the robot's process ended, a new trial began, the mission ended.
-LOST = "lost"
-NEW_TRIAL = "new_trial"
-OVER = "over"
-
-
-@dataclass(slots=True)
-class Attempt:
-    """A robot on a task: one bar of a timeline."""
-
-    robot: str
-    task: str
-    trial: int
-    since: float
-    """In seconds since the trial began."""
-    began: str | None = None
-    """The cause of the decision; None where it was not seen."""
-    until: float | None = None
-    """In seconds since the trial began; None: it goes on."""
-    ended: str | None = None
-    """The cause of the decision, or `LOST`, `NEW_TRIAL` or `OVER`; None where it goes on or that was not seen."""
-
-
-@dataclass(slots=True)
-class RobotSeen:
-    """What was last seen of a robot."""
-
-    name: str
-    present: bool | None = None
-    """Whether its process is there; None: nobody has said so far."""
-    incarnation: int = 0
-    heard_at: float | None = None
-    """When its last message came, on the onlooker's clock, in seconds."""
-    tasks: tuple[str, ...] = ()
-    """What it says it can do."""
-    attempts: dict[str, Attempt] = field(default_factory=dict)
-    """Those that go on, by task: at most one, unless erratum 5 is read literally."""
-    last: Attempt | None = None
-    """The one that ended last."""
-    motivations: Motivations | None = None
-    threshold: float = 1.0
-    """What a motivation must reach, as far as a decision has said."""
-    link: LinkReport | None = None
-
-    @property
-    def task(self) -> str | None:
-        """The task it is on."""
-        return next(iter(self.attempts), None)
-
-    @property
-    def strongest(self) -> tuple[str, Scalars] | None:
-        """The task it is most motivated for, with the factors of that motivation."""
-        sets = self.motivations.sets if self.motivations is not None else {}
-        ranked = sorted(sets.items(), key=lambda item: -_number(item[1].get("motivation")))
-        return ranked[0] if ranked else None
-
-    @property
-    def hears(self) -> dict[str, bool]:
-        """Of each teammate that it ever heard: whether it hears it now."""
-        if self.link is None:
-            return {}
-        return {name: one.lost_for is None for name, one in self.link.teammates.items()}
-
-
-@dataclass(slots=True)
-class TaskSeen:
-    """What was last seen of a task."""
-
-    name: str
-    applicable: bool = False
-    complete: bool = False
-    progress: float = 0.0
-    """From 0 to 1."""
-    completed_at: float | None = None
-    """In seconds since the trial began."""
 
 
 class Story:
@@ -139,7 +64,8 @@ class Story:
         faults: those in force, by name, in words.
         has_launcher: whether somebody is there who holds the robots' processes.
         messages: how many came, by kind and by what became of them: `read`, `stale` (older than what came before),
-            `stranger` (of a robot too many), or why they could not be read.
+            `late` (an event or a decision from before, that was not known), `stranger` (of a robot too many), or why they
+            could not be read.
     """
 
     def __init__(self, mission: str) -> None:
@@ -156,6 +82,8 @@ class Story:
         self.has_launcher = False
         self._keys = Keys(mission)
         self._freshness = Freshness()
+        #: Events and decisions that came, by sender, life and number.
+        self._told: OrderedDict[tuple[str, int, int], None] = OrderedDict()
         #: Of all that happened, in bytes.
         self._sizes: deque[int] = deque()
         self._size = 0
@@ -195,8 +123,9 @@ class Story:
         if message is None:
             return self._presence(key, not sighting.gone, sighting.now)
         if self._freshness.overtaken(key.stream, message.incarnation, message.seq, sighting.now):
-            self.messages[kind, "stale"] += 1
-            return None
+            late = self._late(message, len(sighting.payload))
+            self.messages[kind, "late" if late else "stale"] += 1
+            return late
         if key.robot is not None and self._robot(key.robot) is None:
             self.messages[kind, "stranger"] += 1
             return None
@@ -217,12 +146,30 @@ class Story:
             case ChaosRules():
                 self.rules = message
             case Event():
+                self._is_told(message)
                 return self._heard_event(of_event(message), size)
             case DecisionMade():
+                self._is_told(message)
                 return self._decided(message, now, size)
             case _:
                 self._heard_robot(message, now)
         return None
+
+    def _late(self, message: Message, size: int) -> Happened | None:
+        """What happened, if this tells of it, late; None if that is known or cannot be placed."""
+        if not isinstance(message, Event | DecisionMade) or message.elapsed is None or self._is_told(message):
+            return None
+        one = of_event(message) if isinstance(message, Event) else of_decision(message, message.elapsed)
+        return None if one is None else self._note(one, size)
+
+    def _is_told(self, message: Event | DecisionMade) -> bool:
+        """Whether this one came before; it has come now."""
+        number = (message.sender, message.incarnation, message.seq)
+        is_told = number in self._told
+        self._told[number] = None
+        if len(self._told) > MOST_HAPPENED:
+            self._told.popitem(last=False)
+        return is_told
 
     def _robot(self, name: str) -> RobotSeen | None:
         own = self.status.robots if self.status is not None else {}
@@ -268,7 +215,7 @@ class Story:
             task = self._task(name)
             if task is not None:
                 task.applicable, task.complete = bool(facts.get("applicable")), bool(facts.get("complete"))
-                task.progress = _number(facts.get("progress"))
+                task.progress = number(facts.get("progress"))
         for name, facts in status.robots.items():
             seen = self._robot(name)
             if seen is not None and seen.present != facts.get("present"):
@@ -328,7 +275,7 @@ class Story:
         if self.status is not None and made.trial == self.trial and one.at > self.elapsed(now) + MOST_AHEAD:
             one = replace(one, at=self.elapsed(now))
         seen = self._robot(made.sender)
-        if seen is not None and (threshold := _number(made.terms.get("threshold"))) > 0:
+        if seen is not None and (threshold := number(made.terms.get("threshold"))) > 0:
             seen.threshold = threshold
         if seen is not None and self._is_now(made.trial):
             if made.verb == Verb.ACTIVATE:
@@ -389,7 +336,3 @@ def _has_room(known: dict[str, Any], name: str, own: Container[str]) -> bool:
     if stranger is not None:
         del known[stranger]
     return stranger is not None
-
-
-def _number(value: object) -> float:
-    return float(value) if isinstance(value, int | float) else 0.0

@@ -14,6 +14,7 @@ from rich.text import Text
 from lalliance_agents.clock import MissionClock
 from mission_control.live import bar, can_redraw
 from mission_control.reach import Reached, reached
+from mission_control.watch.absence import words
 from mission_control.watch.board import ORDERS, Row, Selection, rows
 from mission_control.watch.explain import tell
 from mission_control.watch.keyboard import keyboard
@@ -160,6 +161,9 @@ class View:
             )
             line = Text(f"{story.mission}: {status.mission}, {elapsed}{trial}", style="bold")
         line.append(f"   {self._there.endpoint}", style="not bold dim")
+        away_for = self._onlooker.away_for
+        if away_for is not None:
+            line = Text(f"{story.mission}: {words(away_for)} at {self._there.endpoint}", style="bold red")
         done = sum(task.complete for task in story.tasks.values())
         there = sum(seen.present is True for seen in story.robots.values())
         facts = [

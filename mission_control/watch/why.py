@@ -9,6 +9,7 @@ import typer
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.errors import UserError
 from mission_control.reach import reached
+from mission_control.watch.absence import told_of_absence
 from mission_control.watch.explain import plain, tell, unmoved
 from mission_control.watch.happened import Happened
 from mission_control.watch.onlooker import Onlooker, look, meet
@@ -104,9 +105,10 @@ async def live(mission: str | None, connect: str | None, keys: Path | None, answ
         now = await _now(onlooker, story, window) if wants_now else None
         answer.past(story, now, goes_on=follow)
         if follow:
-            async for one in further(onlooker, story):
-                if window.holds(one):
-                    answer.add(one)
+            async with told_of_absence(onlooker, there.endpoint):
+                async for one in further(onlooker, story):
+                    if window.holds(one):
+                        answer.add(one)
 
 
 async def _now(onlooker: Onlooker, story: Story, window: Window) -> str | None:

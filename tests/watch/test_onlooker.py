@@ -130,7 +130,7 @@ async def test_others_have_their_turn_however_much_waits(monkeypatch: pytest.Mon
 
 
 async def test_what_waits_is_limited_in_bytes_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mission_control.watch.onlooker.HEAVIEST", 1000)
+    monkeypatch.setattr("mission_control.watch.waiting.HEAVIEST", 1000)
     hub = MemoryHub()
     async with MemoryBus(hub) as bus, MemoryBus(hub) as robot:
         await robot.announce_presence(ALIVE)

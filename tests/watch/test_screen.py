@@ -1,5 +1,6 @@
 """What fills the terminal: that it fits, whatever its size and whatever is on the bus."""
 
+import asyncio
 import io
 
 import pytest
@@ -55,6 +56,21 @@ async def test_the_view_fits_the_terminal_and_ends_with_its_keys(width: int, hei
     assert lines[3].startswith(("robot-00", "robot…"))
     assert lines[-1].startswith("by name")
     assert any("3.0 s: ?[2J?59x" in line for line in lines) == (robots == 4)
+
+
+@pytest.mark.virtual_time
+async def test_the_head_of_the_view_says_that_the_bus_is_down() -> None:
+    hub, console = MemoryHub(), Console(file=io.StringIO(), width=100, height=24)
+    async with MemoryBus(hub) as bus, Onlooker(bus, "m", MissionClock(), motivations=True) as onlooker:
+        view = View(Reached("m", "tcp/there:1", bus), Story("m"), onlooker, console)
+        hub.go_down()
+        await asyncio.sleep(5)
+        away = ["".join(segment.text for segment in line) for line in console.render_lines(view.screen())]
+        hub.come_back()
+        await asyncio.sleep(1)
+        back = ["".join(segment.text for segment in line) for line in console.render_lines(view.screen())]
+    assert away[0].rstrip() == "m: the bus has not been reached for 5 s at tcp/there:1"
+    assert back[0].rstrip() == "m: no world server is heard   tcp/there:1"
 
 
 @pytest.mark.virtual_time

@@ -129,6 +129,29 @@ def test_who_missed_a_decision_still_learns_who_is_on_what_from_what_robots_anno
     ]
 
 
+def test_what_comes_late_has_happened_once_and_changes_nothing_that_holds_now() -> None:
+    bus = Bus()
+    bus.status(10.0, 10.0)
+    bus.seq = 20
+    bus.decide("activate", "free", 8.0, elapsed=8.0, task="b")
+    bus.event("gone", "right is gone", 9.0, robot="right")
+    for _ in range(2):
+        bus.seq = 10
+        bus.decide("yield", "contender", 11.0, elapsed=7.0, other="right")
+        bus.event("present", "right is there", 6.0, robot="right")
+    bus.seq = 10
+    bus.decide("activate", "free", 11.0, task="c")
+    assert [(one.at, one.text) for one in bus.story.happened] == [
+        (8.0, "left starts b: nobody is on it"),
+        (9.0, "right is gone"),
+        (7.0, "left yields a: to right, after 0.0 s"),
+        (6.0, "right is there"),
+    ]
+    assert bus.story.messages["decision", "late"] == bus.story.messages["event", "late"] == 1
+    assert (bus.story.messages["decision", "stale"], bus.story.messages["event", "stale"]) == (2, 1)
+    assert bus.bars() == [("left", "b", 1, 8.0, "free", None, None)]
+
+
 def test_hostile_messages_are_counted_and_change_nothing() -> None:
     bus = Bus()
     bus.status(10.0, 10.0)
