@@ -60,6 +60,7 @@ async def _record(
     from mission_control.reach import reached
     from mission_control.recording.recorder import Recorder
     from mission_control.recording.writer import check_new
+    from mission_control.watch.absence import told_of_absence
 
     check_new(out)
     async with reached(mission.name, connect, keys) as there:
@@ -70,8 +71,10 @@ async def _record(
                 sys.stdout.flush()
 
             # To be told to end is how a recording is meant to end.
+            recorder = Recorder(there.bus, mission, writer, MissionClock(speed), say)
             with contextlib.suppress(asyncio.CancelledError):
-                await Recorder(there.bus, mission, writer, MissionClock(speed), say).run()
+                async with told_of_absence(recorder, there.endpoint):
+                    await recorder.run()
             return writer
 
 
@@ -215,6 +218,16 @@ def _document(found: "Information") -> dict[str, Any]:
         "counts": found.counts,
         "ended": None if found.ending is None else found.ending.reason,
         "dropped": None if found.ending is None else found.ending.dropped,
+        "gaps": [
+            {
+                "since": gap.since.wall / 1e9,
+                "until": gap.until.wall / 1e9,
+                "why": gap.why,
+                "answered": gap.answered,
+                "recovered": gap.recovered,
+            }
+            for gap in found.gaps
+        ],
     }
 
 

@@ -20,7 +20,7 @@ from lalliance_agents.errors import MessageError, UserError
 from lalliance_agents.whole_file import written_whole
 from lalliance_agents.wire.keys import Keys, Kind
 from lalliance_agents.wire.messages import Message
-from mission_control.recording.format import ABOUT, CONVERTED, ENDING, MOST_CHANNELS, schema_of
+from mission_control.recording.format import ABOUT, CONVERTED, ENDING, GAP, MOST_CHANNELS, gap_metadata, schema_of
 from mission_control.recording.reader import Recording
 from mission_control.recording.viewer_schema import Found, viewer_schema
 from mission_control.recording.writer import check_new
@@ -82,6 +82,8 @@ def convert(path: Path, out: Path) -> Converted:
             )
             messages += 1
             unreadable += document.is_unreadable
+        for gap in recording.gaps:
+            writer.add_metadata(GAP, gap_metadata(gap))
         if recording.ending is not None:
             writer.add_metadata(ENDING, recording.ending.metadata())
         writer.finish()

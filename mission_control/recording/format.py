@@ -2,18 +2,21 @@
 
 import functools
 import json
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from lalliance_agents.wire.keys import Kind
 from lalliance_agents.wire.messages import BODY_OF
+from mission_control.watch.gaps import Gap, Moment
 from mission_control.watch.sighting import PRESENCES
 
 #: The profile in the header of a recording, and of one that was converted for viewers.
 PROFILE = "lalliance"
 CONVERTED = "lalliance-json"
-#: Metadata records: which mission it is, and how the recording ended.
+#: Metadata records: which mission it is, a time in which nothing was heard, and how the recording ended.
 ABOUT = "lalliance/mission"
+GAP = "lalliance/gap"
 ENDING = "lalliance/ending"
 #: The version of this format.
 FORMAT = "1"
@@ -77,6 +80,35 @@ class About(NamedTuple):
             ValueError: it is no seed.
         """
         return cls(metadata["mission"], metadata["text"], int(metadata["seed"]), metadata["version"])
+
+
+def gap_metadata(gap: Gap) -> dict[str, str]:
+    """A gap as it stands in a file."""
+    return {
+        "since": str(gap.since.wall),
+        "until": str(gap.until.wall),
+        "mission_since": repr(gap.since.mission),
+        "mission_until": repr(gap.until.mission),
+        "why": gap.why,
+        "answered": "yes" if gap.answered else "no",
+        "recovered": str(gap.recovered),
+    }
+
+
+def gap_of(metadata: Mapping[str, str]) -> Gap:
+    """The gap that a file tells of.
+
+    Raises:
+        KeyError: something is missing.
+        ValueError: it is no number, or no instant.
+    """
+    since, until = (
+        Moment(int(metadata[name]) / 1e9, int(metadata[name]), float(metadata[f"mission_{name}"]))
+        for name in ("since", "until")
+    )
+    if not all(0 <= one.wall < 2**64 and math.isfinite(one.mission) for one in (since, until)):
+        raise ValueError(since, until)
+    return Gap(since, until, metadata["why"], metadata["answered"] == "yes", int(metadata["recovered"]))
 
 
 class Ending(NamedTuple):

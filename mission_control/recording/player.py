@@ -95,7 +95,7 @@ class Player:
         self._start = start
         self._keys = Keys(recording.about.mission)
         self._retained = Retained(recording.about.mission)
-        self._witness = Onlooker(witness, recording.about.mission, MissionClock(), motivations=True)
+        self._witness = Onlooker(witness, recording.about.mission, MissionClock(), motivations=True, asks=False)
         self._arrivals = Arrivals()
         self._arrival = asyncio.Event()
         self._announced: dict[str, Registration] = {}

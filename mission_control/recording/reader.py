@@ -4,10 +4,12 @@ A file is read from its beginning and never held in memory as a whole. One that 
 or it was cut, gives all that is in it; what is missing is told when the reading comes to it.
 """
 
+import contextlib
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -17,12 +19,15 @@ from mcap.records import Channel, Header, Message, Metadata, Schema
 from mcap.summary import Summary
 
 from lalliance_agents.errors import UserError
-from mission_control.recording.format import ABOUT, CONVERTED, ENDING, PRESENCE, PROFILE, About, Ending
+from mission_control.recording.format import ABOUT, CONVERTED, ENDING, GAP, PRESENCE, PROFILE, About, Ending, gap_of
 from mission_control.recording.scan import MAGIC, Scan
+from mission_control.watch.gaps import Gap
 from mission_control.watch.sighting import Sighting
 
 _EXPECTED = "expected what `lalliance record` or `lalliance run --record` writes"
 _NANOSECONDS = 1_000_000_000
+#: Gaps that are told of.
+MOST_GAPS = 10_000
 
 Tell = Callable[[str], None]
 
@@ -40,6 +45,7 @@ class Information:
         counts: messages by key; coming and going count on the key of a presence.
         ending: how the recording ended; None: its recorder could not say so any more.
         broken: why it cannot be read to its end, if it cannot.
+        gaps: times in which nothing could be heard.
     """
 
     path: Path
@@ -50,6 +56,7 @@ class Information:
     counts: dict[str, int]
     ending: Ending | None
     broken: str | None
+    gaps: tuple[Gap, ...] = ()
 
     @property
     def messages(self) -> int:
@@ -99,6 +106,7 @@ class Recording:
         about: its mission.
         ending: how it ended, once it was iterated over and if it says so.
         broken: a sentence, once it was iterated over and if it is not whole.
+        gaps: times in which nothing could be heard, as far as it was iterated over; no more than `MOST_GAPS`.
 
     Raises:
         UserError: there is no recording at `path`, or not even its beginning.
@@ -108,6 +116,7 @@ class Recording:
         self.path = path
         self.broken: str | None = None
         self.ending: Ending | None = None
+        self.gaps: list[Gap] = []
         with self._open() as file:
             self.about = self._read_about(Scan(file))
 
@@ -118,6 +127,7 @@ class Recording:
         with self._open() as file:
             scan = Scan(file)
             channels = _Channels()
+            self.gaps.clear()
             for record in scan:
                 match record:
                     case Schema():
@@ -126,6 +136,8 @@ class Recording:
                         channels.add(record)
                     case Metadata() if record.name == ENDING:
                         self.ending = _ending(record.metadata)
+                    case Metadata() if record.name == GAP and len(self.gaps) < MOST_GAPS:
+                        self.gaps += _gaps([record.metadata])
                     case Message():
                         sighting = channels.sighting(record)
                         if sighting is None:
@@ -146,7 +158,7 @@ class Recording:
             counts[sighting.key] += 1
             first = sighting.seen_at if not first else min(first, sighting.seen_at)
             last = max(last, sighting.seen_at)
-        return self._information(_Facts(first, last, dict(counts)), self.ending)
+        return self._information(_Facts(first, last, dict(counts)), self.ending, self.gaps)
 
     def summarized(self) -> Information | None:
         """What it holds, by its index; None if it has none that can be read."""
@@ -154,13 +166,15 @@ class Recording:
             with self._open() as file:
                 reader = make_reader(file)
                 summary = reader.get_summary()
-                endings = [record.metadata for record in reader.iter_metadata() if record.name == ENDING]
+                metadata = list(reader.iter_metadata())
+                endings = [record.metadata for record in metadata if record.name == ENDING]
+                gaps = _gaps([record.metadata for record in metadata if record.name == GAP])
             facts = None if summary is None else _facts(summary)
         except Exception:  # whatever the library makes of a file that is not whole
             return None
-        return None if facts is None else self._information(facts, _ending(endings[0]) if endings else None)
+        return None if facts is None else self._information(facts, _ending(endings[0]) if endings else None, gaps)
 
-    def _information(self, facts: "_Facts", ending: Ending | None) -> Information:
+    def _information(self, facts: "_Facts", ending: Ending | None, gaps: Iterable[Gap]) -> Information:
         return Information(
             path=self.path,
             about=self.about,
@@ -170,6 +184,7 @@ class Recording:
             counts=dict(sorted(facts.counts.items())),
             ending=ending,
             broken=self.broken,
+            gaps=tuple(islice(gaps, MOST_GAPS)),
         )
 
     def _open(self) -> BinaryIO:
@@ -254,3 +269,11 @@ def _ending(metadata: dict[str, str]) -> Ending | None:
         return Ending.of(metadata)
     except (KeyError, ValueError):
         return None
+
+
+def _gaps(found: list[dict[str, str]]) -> list[Gap]:
+    gaps = []
+    for metadata in found:
+        with contextlib.suppress(KeyError, ValueError):
+            gaps.append(gap_of(metadata))
+    return gaps

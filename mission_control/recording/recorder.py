@@ -2,6 +2,8 @@
 
 What was seen is handed to the system twice a second also when little comes. A mission is over when the world has said so and
 everybody has left, or some time after; or when everybody has left and nothing was said for a while, as after a crash of all.
+While the bus is down nobody can be seen to be there, so that is waited for longer. Each time in which nothing could be heard
+stands in the file.
 """
 
 import asyncio
@@ -18,6 +20,7 @@ from lalliance_agents.wire.keys import Keys, Kind
 from lalliance_agents.wire.messages import Status
 from mission_control.recording.format import Ending
 from mission_control.recording.writer import RecordingError, RecordingWriter
+from mission_control.watch.gaps import Gap
 from mission_control.watch.onlooker import Onlooker
 from mission_control.watch.sighting import Sighting, read
 
@@ -25,6 +28,8 @@ from mission_control.watch.sighting import Sighting, read
 LINGER = 5.0
 #: A mission of which nobody is left is over when nothing was said for so long, in real seconds.
 ABANDONED = 10.0
+#: How long a bus that is down is waited for, in real seconds.
+UNREACHED = 60.0
 #: At the end, how long nothing may come before nothing more is expected, and how long to wait for that, in real seconds.
 QUIET = 0.3
 LAST_WORDS = 3.0
@@ -33,6 +38,7 @@ _LOOK_PERIOD = 0.1
 
 OVER = "the mission is over"
 LEFT = "nobody was left in the mission"
+CUT_OFF = "the bus was not reached any more"
 STOPPED = "the recorder was told to end"
 
 
@@ -52,7 +58,8 @@ class Recorder:
     ) -> None:
         self._ready = ready
         self._writer = writer
-        self._onlooker = Onlooker(bus, mission.name, clock, motivations=True)
+        self._gaps: list[Gap] = []
+        self._onlooker = Onlooker(bus, mission.name, clock, motivations=True, notice=self._gaps.append)
         self._keys = Keys(mission.name)
         self._status_key = self._keys.build(Kind.STATUS)
         self._loop = asyncio.get_running_loop()
@@ -69,6 +76,11 @@ class Recorder:
     def dropped(self) -> int:
         """Messages that came, or would have come, and are not in the file."""
         return self._onlooker.dropped + self._writer.refused
+
+    @property
+    def away_for(self) -> float | None:
+        """How long the bus has been down, in real seconds; None if it is up."""
+        return self._onlooker.away_for
 
     def stop(self) -> None:
         """Have the recording end as soon as nothing more comes."""
@@ -87,10 +99,16 @@ class Recorder:
                 self._ready()
                 taking = asyncio.create_task(self._take_all())
                 reason = await self._wait(taking)
+                ended = self._loop.time()
+            if reason is OVER:  # a router that ends with its mission makes no gap
+                self._gaps[:] = [gap for gap in self._gaps if gap.until.real < ended]
         finally:
-            if taking is not None:
-                await taking  # what still waits, and then the end
-            self._writer.ending = Ending(reason, self.dropped)
+            try:
+                if taking is not None:
+                    await taking  # what still waits, and then the end
+                self._write_gaps()
+            finally:
+                self._writer.ending = Ending(reason, self.dropped)
         return self._writer.ending
 
     async def _wait(self, taking: "asyncio.Task[None]") -> str:
@@ -99,8 +117,13 @@ class Recorder:
             await asyncio.wait({taking}, timeout=_LOOK_PERIOD)
             if taking.done():
                 taking.result()
+            self._write_gaps()
             self._writer.flush_if_due()
         return reason
+
+    def _write_gaps(self) -> None:
+        while self._gaps:
+            self._writer.add_gap(self._gaps.pop(0))
 
     async def _take_all(self) -> None:
         async for sighting in self._onlooker:
@@ -123,14 +146,18 @@ class Recorder:
 
     def _reason(self) -> str | None:
         now = self._loop.time()
-        quiet = now - self._last
+        quiet = min(now - self._last, self._onlooker.quiet_for)
         if self._stopping is not None:
             done = quiet >= QUIET or now - self._stopping >= LAST_WORDS
             return (OVER if self._over_since else STOPPED) if done else None
         if self._over_since is not None:
             done = now - self._over_since >= LINGER or (not self._present and quiet >= QUIET)
             return OVER if done else None
-        return LEFT if self._has_begun and not self._present and quiet >= ABANDONED else None
+        if not self._has_begun or self._present:
+            return None
+        if self.away_for is not None:
+            return CUT_OFF if self.away_for >= UNREACHED else None
+        return LEFT if quiet >= ABANDONED else None
 
 
 @contextlib.asynccontextmanager
@@ -181,6 +208,8 @@ def told(writer: RecordingWriter) -> str:
     """What became of a recording, in a sentence."""
     dropped = writer.ending.dropped
     lost = f"{dropped:,} that came too fast, or on made-up keys, are not in it" if dropped else "nothing was dropped"
+    if writer.gaps:
+        lost += f", but nothing was heard {_count(writer.gaps, 'time')}, for {writer.missing:.1f} s altogether"
     return f"{_count(writer.written, 'message')} on {_count(writer.keys, 'key')} recorded in {writer.path}; {lost}"
 
 

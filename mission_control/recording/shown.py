@@ -11,6 +11,9 @@ from lalliance_agents.wire.keys import Keys
 from mission_control.recording.reader import Information
 from mission_control.watch.words import printable
 
+#: Gaps that are printed each.
+SHOWN = 10
+
 
 def show(found: Information, console: Console) -> None:
     """Print what a recording holds."""
@@ -39,3 +42,8 @@ def _facts(found: Information) -> Iterator[tuple[str, str]]:
     yield "messages", f"{found.messages:,} on {len(found.counts):,} keys"
     yield "ended", "-" if found.ending is None else found.ending.reason
     yield "dropped", "-" if found.ending is None else f"{found.ending.dropped:,}"
+    for gap in found.gaps[:SHOWN]:
+        began = datetime.datetime.fromtimestamp(gap.since.wall / 1e9, datetime.UTC)
+        yield "gap", f"from {began:%Y-%m-%d %H:%M:%S} UTC: {gap}"
+    if len(found.gaps) > SHOWN:
+        yield "gaps", f"{len(found.gaps):,} altogether"

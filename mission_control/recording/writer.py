@@ -18,13 +18,16 @@ from lalliance_agents.wire.keys import Key, Keys, Kind
 from mission_control.recording.format import (
     ABOUT,
     ENDING,
+    GAP,
     MOST_CHANNELS,
     MOST_STRANGE,
     PROFILE,
     About,
     Ending,
+    gap_metadata,
     schema_of,
 )
+from mission_control.watch.gaps import Gap
 from mission_control.watch.sighting import PRESENCES, Sighting
 
 #: How long what was added may wait before the system has it, in real seconds.
@@ -49,6 +52,8 @@ class RecordingWriter:
     Attributes:
         written: sightings in the file.
         refused: messages that are not in it, because they came on more keys than it takes.
+        gaps: times in which nothing could be heard, as far as it was told.
+        missing: how long they were together, in real seconds.
 
     Raises:
         UserError: there is something at `path`, or nothing can be written there.
@@ -58,6 +63,8 @@ class RecordingWriter:
         self.path = path
         self.written = 0
         self.refused = 0
+        self.gaps = 0
+        self.missing = 0.0
         self.ending = Ending("unknown")
         self._mission = mission
         self._keys = Keys(mission.name)
@@ -112,6 +119,18 @@ class RecordingWriter:
             )
         self.written += 1
         self.flush_if_due()
+
+    def add_gap(self, gap: Gap) -> None:
+        """Put into the file that nothing could be heard for a time.
+
+        Raises:
+            RecordingError: it cannot be written.
+        """
+        with self._writing():
+            self._writer.flush()
+            self._writer.add_metadata(GAP, gap_metadata(gap))
+        self.gaps += 1
+        self.missing += gap.lasts
 
     def flush(self) -> None:
         """Hand all that was added to the system, which keeps it whatever becomes of this process.
