@@ -7,7 +7,7 @@ chronicle up to a version is new to all that is above it. How much is kept of th
 
 from collections import Counter, deque
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
@@ -17,12 +17,15 @@ from lalliance_agents.errors import MessageError
 from lalliance_agents.model.events import OCCASIONS, Cause
 from lalliance_agents.wire.keys import PRESENCE, Keys
 from lalliance_agents.wire.messages import LinkReport, Motivations
+from mission_control.dashboard.bars import ENDED, ENDS, Bar
 from mission_control.dashboard.losses import Losses
 from mission_control.dashboard.series import Series
 from mission_control.watch.explain import explain
+from mission_control.watch.gaps import Gap
 from mission_control.watch.happened import Happened
+from mission_control.watch.seen import Attempt, RobotSeen
 from mission_control.watch.sighting import Sighting
-from mission_control.watch.story import MOST_NAMES, Attempt, RobotSeen, Story
+from mission_control.watch.story import MOST_NAMES, Story
 from mission_control.watch.words import printable
 from world_server.world import TRIAL_PAUSE
 
@@ -51,20 +54,6 @@ FACTORS_PERIOD = 1.0
 
 #: What the timeline shows as a sign.
 _MARKS = frozenset({"takeover", "gone", "present", "complete"})
-#: How attempts end, as the timeline shows it; how else: the robot left the task.
-_ENDS = {"sensed": "done", "lost": "lost", "body_failed": "lost"}
-_ENDED = {
-    "sensed": "ended: the task is complete",
-    "lost": "ended: the robot's process is gone",
-    "contender": "ended: the robot yielded to a teammate",
-    "collision": "ended: a teammate had started at the same time",
-    "no_success": "ended: the robot gave up without success",
-    "inapplicable": "ended: the task did not apply any more",
-    "body_failed": "ended: the robot's own code failed",
-    "new_trial": "ended with the trial",
-    "over": "ended with the mission",
-}
-
 #: Why an attempt begins that takes a task over.
 _TAKEN = frozenset(OCCASIONS) - {Cause.FREE}
 
@@ -75,18 +64,6 @@ class Versioned:
 
     past: Series[Any]
     version: int = 0
-
-
-@dataclass(slots=True)
-class Bar:
-    """An attempt on the line of time."""
-
-    number: int
-    attempt: Attempt
-    why: str | None = None
-    """Why it began; None: not looked for yet."""
-    version: int = 0
-    shown: dict[str, Any] = field(default_factory=dict)
 
 
 class Chronicle:
@@ -167,6 +144,21 @@ class Chronicle:
             self.now = max(self.now, self.place(status.trial, status.elapsed))
         if happened is not None:
             self._note(happened)
+
+    def miss(self, gap: Gap) -> None:
+        """Tell of a time in which nothing could be heard, where it began."""
+        elapsed = self.story.elapsed(gap.since.mission)
+        self._numbers += 1
+        self.version += 1
+        at = round(self.place(self.story.trial, elapsed), 3)
+        entry = {
+            "id": self._numbers,
+            "from": at,
+            "elapsed": round(elapsed, 3),
+            "kind": "gap",
+            "text": printable(str(gap)),
+        }
+        self.told.append(entry)
 
     def place(self, trial: int, elapsed: float) -> float:
         """Where an instant of a trial is on the line of time, in seconds since the first trial began."""
@@ -305,7 +297,7 @@ class Chronicle:
         ended = attempt.ended
         if until is not None and self._done_by.get(attempt.task) == (attempt.trial, attempt.robot) and ended != "lost":
             ended = "sensed"
-        end = "" if until is None else _ENDS.get(ended or "", "left")
+        end = "" if until is None else ENDS.get(ended or "", "left")
         return {
             "id": bar.number,
             "robot": attempt.robot,
@@ -315,7 +307,7 @@ class Chronicle:
             "to": until,
             "end": end,
             "taken": attempt.began in _TAKEN,
-            "ended": _ENDED.get(ended or "", printable(f"ended: {ended or 'why is not known'}", 80)),
+            "ended": ENDED.get(ended or "", printable(f"ended: {ended or 'why is not known'}", 80)),
             "why": bar.why or "",
         }
 

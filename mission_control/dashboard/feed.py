@@ -2,11 +2,12 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Iterable, Sequence
 
 from lalliance_agents.bus.base import Bus
 from lalliance_agents.clock import MissionClock
 from mission_control.dashboard.chronicle import Chronicle
+from mission_control.watch.gaps import Gap
 from mission_control.watch.onlooker import Onlooker
 from mission_control.watch.sighting import Sighting
 
@@ -32,7 +33,7 @@ class LiveFeed:
         self._chronicle = chronicle
         self._speed = speed
         self._clock = MissionClock(speed)
-        self._onlooker = Onlooker(bus, mission, self._clock, motivations=True)
+        self._onlooker = Onlooker(bus, mission, self._clock, motivations=True, notice=chronicle.miss)
 
     @property
     def now(self) -> float:
@@ -76,14 +77,30 @@ class LiveFeed:
             self._chronicle.settle()
 
 
-async def retell(sightings: Iterable[Sighting], chronicle: Chronicle) -> None:
-    """Hand a whole recording to a chronicle; others have their turn meanwhile."""
+async def retell(sightings: Iterable[Sighting], chronicle: Chronicle, gaps: Sequence[Gap] = ()) -> None:
+    """Hand a whole recording to a chronicle; others have their turn meanwhile.
+
+    Args:
+        sightings: what was seen.
+        chronicle: takes it.
+        gaps: times in which nothing could be heard; grows while the sightings are read, each once its end was.
+    """
     due = None
+    missed = 0
     for count, sighting in enumerate(sightings, 1):
         if due is None or sighting.now >= due:
             chronicle.settle()
             due = sighting.now + SETTLE_PERIOD
         chronicle.take(sighting)
+        missed = _miss(gaps, missed, chronicle)
         if count % AT_ONCE == 0:
             await asyncio.sleep(0)
+    _miss(gaps, missed, chronicle)
     chronicle.settle()
+
+
+def _miss(gaps: Sequence[Gap], missed: int, chronicle: Chronicle) -> int:
+    """Tell of the gaps that are not told of yet; how many there are."""
+    for gap in gaps[missed:]:
+        chronicle.miss(gap)
+    return len(gaps)

@@ -219,7 +219,7 @@ async def show_recording(path: Path, mission: Mission | None, address: Address, 
     with listen(address.host, address.port) as listening:
         async with served(site.app(), listening):
             _locate(say, name, replace(address, own_token=False), listening)
-            await retell(recording, chronicle)
+            await retell(recording, chronicle, recording.gaps)
             if recording.broken:
                 say(recording.broken)
             await asyncio.Event().wait()

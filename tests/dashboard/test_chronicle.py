@@ -9,6 +9,7 @@ from support.telling import Telling
 from lalliance_agents.wire.keys import Kind
 from mission_control.dashboard.series import FEWEST, Series
 from mission_control.dashboard.view import View
+from mission_control.watch.gaps import Gap, Moment
 
 
 def drawn(updates: list[dict[str, Any]]) -> dict[str, Any]:
@@ -36,6 +37,17 @@ def test_the_timeline_shows_who_took_what_over_from_whom() -> None:
     [fault] = update["faults"]
     assert (fault["name"], fault["text"], fault["from"], fault["to"]) == ("1-crash", "crash of left", 4.0, None)
     assert "right takes a from left (silence)" in [one["text"] for one in update["told"]]
+
+
+def test_a_time_in_which_nothing_could_be_heard_is_a_line_where_it_began() -> None:
+    telling = Telling()
+    telling.takeover()
+    view = View(telling.chronicle)
+    view.update()
+    telling.chronicle.miss(Gap(Moment(3.0, 3, 3.0), Moment(5.5, 5, 5.5), "nobody was there\x1b"))
+    [line] = view.update()["told"]
+    told = "nobody was there? for 2.5 s; what happened then is not known"
+    assert (line["from"], line["elapsed"], line["kind"], line["text"]) == (3.0, 3.0, "gap", told)
 
 
 def test_the_state_is_found_again_as_it_was() -> None:
