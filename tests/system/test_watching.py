@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,30 @@ def at_once(processes: Processes, commands: dict[str, list[str]]) -> dict[str, s
     told = {name: process.communicate(timeout=100) for name, process in started.items()}
     assert {name: told[name][1] for name, process in started.items() if process.returncode} == {}
     return {name: out for name, (out, _) in told.items()}
+
+
+def nothing_is_missing_afterwards(processes: Processes) -> "subprocess.Popen[str]":
+    """Kill the router: the world tells who is gone, which nobody hears; it is asked for when the router is back.
+
+    Returns:
+        An `echo` that has seen it.
+    """
+    follow, echo = processes.start("why", "--follow"), processes.start("echo", "heartbeat/carrier")
+    read_until(follow, "carrier finished crate-2")
+    read_until(echo, "sender: carrier")
+    [router] = processes.alive("router")
+    os.kill(router, signal.SIGKILL)
+    told = read_until(follow, "pusher is there")
+    assert sum("carrier is gone" in line for line in told) == 1
+    read_until(echo, "sender: carrier")
+
+    def said(*more: str) -> list[str]:
+        return sorted(map(json.dumps, json.loads(processes.run("why", "--json", *more).stdout)["happened"]))
+
+    until(lambda: said() == said("--bag", "mission.mcap"))
+    follow.send_signal(signal.SIGINT)
+    assert follow.wait(timeout=30) == 130
+    return echo
 
 
 def test_every_command_that_is_shown_works_beside_a_mission(processes: Processes, mission: Path) -> None:
@@ -102,6 +127,7 @@ def test_every_command_that_is_shown_works_beside_a_mission(processes: Processes
         return done.returncode == 0 and decisions(done.stdout) == live
 
     until(remembered)
+    echo = nothing_is_missing_afterwards(processes)
 
     refused = {
         ("why", "carier"): "mission material_handling has no robot 'carier'; did you mean 'carrier'?",
@@ -114,6 +140,12 @@ def test_every_command_that_is_shown_works_beside_a_mission(processes: Processes
     assert all((out, code) == ("", 2) and refused[words] in err for words, (out, err, code) in answers.items()), answers
     run.send_signal(signal.SIGINT)
     assert run.wait(timeout=30) == 130
+    [gap] = json.loads(processes.run("bag", "info", "mission.mcap", "--json").stdout)["gaps"]
+    assert (gap["why"], gap["answered"], gap["recovered"] > 1) == ("the bus was not reached", True, True)
+    assert echo.stderr is not None
+    assert "the bus has not been reached for 2 s at tcp/127.0.0.1:" in echo.stderr.readline()
+    echo.send_signal(signal.SIGINT)
+    assert echo.wait(timeout=30) == 130
     left = processes.run("why")
     assert (left.returncode, left.stdout) == (2, "")
     assert "no mission is known to run on this machine, and no router answers at" in left.stderr
