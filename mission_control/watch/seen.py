@@ -39,7 +39,7 @@ class RobotSeen:
     """Whether its process is there; None: nobody has said so far."""
     incarnation: int = 0
     heard_at: float | None = None
-    """When its last message came, on the onlooker's clock, in seconds."""
+    """When it last said something other than a decision, on the onlooker's clock, in seconds."""
     tasks: tuple[str, ...] = ()
     """What it says it can do."""
     attempts: dict[str, Attempt] = field(default_factory=dict)

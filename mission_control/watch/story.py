@@ -139,7 +139,10 @@ class Story:
         """Go on with a checked, fresh message of `size` bytes that came at `now` on the onlooker's clock; what happened."""
         if message.sender in self.robots:
             seen = self.robots[message.sender]
-            seen.heard_at, seen.incarnation = now, message.incarnation
+            seen.incarnation = message.incarnation
+            # The world gives decisions again, also those of robots that are dead.
+            if not isinstance(message, DecisionMade):
+                seen.heard_at = now
         match message:
             case Status():
                 self._heard_status(message, now)
@@ -299,6 +302,9 @@ class Story:
                 seen.motivations = message
             case LinkReport():
                 seen.link = message
+            case Activity() | Heartbeat() if self._has_world and self.status is None:
+                # What the past told ends before the present, and only the world's status says how late that is.
+                pass
             case Activity() if self._is_now(message.trial):
                 self._begin(seen, message.task, max(self.elapsed(now) - message.active_for, 0.0))
             case Heartbeat() if self._is_now(message.trial):

@@ -8,9 +8,12 @@ from lalliance_agents.wire.keys import LAUNCHER, WORLD, Keys, Kind
 from lalliance_agents.wire.messages import BODY_OF, DecisionMade, encode
 from mission_control.watch.sighting import Sighting
 from mission_control.watch.story import HEAVIEST_HAPPENED, MOST_AT_ONCE, MOST_NAMES, Story
+from mission_control.watch.why import Answer, unworkable
+from mission_control.watch.window import Window
 from mission_control.watch.words import describe, printable
 
 KEYS = Keys("m")
+RUNNING = {"mission": "running", "trials": 2, "learning": "adaptive"}
 HEADER = {"sender": "left", "incarnation": 1, "seq": 1, "at": 5.0}
 
 
@@ -30,9 +33,8 @@ class Bus:
         return None if happened is None else str(happened)
 
     def status(self, now: float, elapsed: float, trial: int = 1, **robots: dict[str, Any]) -> None:
-        fixed = {"mission": "running", "trials": 2, "learning": "adaptive"}
         tasks = {"a": {"complete": False, "applicable": True, "progress": 0.25}}
-        self.say(Kind.STATUS, now, trial=trial, elapsed=elapsed, tasks=tasks, robots=robots, **fixed)
+        self.say(Kind.STATUS, now, trial=trial, elapsed=elapsed, tasks=tasks, robots=robots, **RUNNING)
 
     def event(self, kind: str, text: str, elapsed: float, trial: int = 1, **fields: Any) -> str | None:
         return self.say(Kind.EVENT, elapsed, kind=kind, text=text, elapsed=elapsed, trial=trial, **fields)
@@ -152,6 +154,24 @@ def test_what_comes_late_has_happened_once_and_changes_nothing_that_holds_now() 
     assert bus.bars() == [("left", "b", 1, 8.0, "free", None, None)]
 
 
+def test_who_comes_late_asks_the_world_how_late_it_is_before_it_says_how_long_a_robot_is_on_its_task() -> None:
+    bus = Bus()
+    bus.decide("activate", "free", 1.0, elapsed=122.0)
+    bus.event("gone", "left does not answer", 131.0, robot="left")
+    bus.say(Kind.ACTIVITY, 1.0, by="left", task="a", trial=1, active_for=20.0, expected=30.0)
+    bus.status(1.1, 142.0)
+    bus.say(Kind.ACTIVITY, 1.2, by="left", task="a", trial=1, active_for=20.1, expected=30.0)
+    assert [round(one.since, 1) for one in bus.story.attempts] == [122.0, 122.0]
+
+
+def test_decisions_of_the_dead_do_not_make_them_speak() -> None:
+    bus = Bus()
+    bus.decide("activate", "free", 1.0, elapsed=30.0)
+    assert bus.story.robots["left"].heard_at is None
+    bus.say(Kind.HEARTBEAT, 2.0, by="left", trial=1)
+    assert bus.story.robots["left"].heard_at == 2.0
+
+
 def test_hostile_messages_are_counted_and_change_nothing() -> None:
     bus = Bus()
     bus.status(10.0, 10.0)
@@ -190,6 +210,7 @@ def test_without_a_world_robots_say_which_trial_it_is_and_presence_tells_who_wen
 
 def test_whoever_makes_things_up_gets_little_room() -> None:
     bus = Bus()
+    bus.status(0.0, 0.0)
     for number in range(MOST_NAMES + 50):
         bus.event("fault", "fault: made up", 1.0, details={"name": f"{number}-{'x' * 100}", "begins": True})
         bus.say(Kind.ACTIVITY, 2.0, by="ghost", task=f"task-{number}", trial=1, active_for=0.0, expected=1.0)
@@ -224,3 +245,25 @@ def test_made_up_robots_make_room_for_those_of_the_world() -> None:
     assert len(bus.story.robots) == MOST_NAMES
     bus.say(Kind.HEARTBEAT, 3.0, by="one-more-ghost", trial=0)
     assert "one-more-ghost" not in bus.story.robots
+
+
+@pytest.mark.parametrize(
+    ("task", "said"),
+    [
+        ({"complete": True, "applicable": False}, "is complete"),
+        ({"complete": False, "applicable": False}, "cannot be worked on just now"),
+        ({"complete": False, "applicable": True}, "is complete or cannot be worked on just now"),
+    ],
+)
+def test_the_world_knows_why_a_task_does_not_apply(task: dict[str, bool], said: str) -> None:
+    bus = Bus()
+    bus.status(10.0, 10.0)
+    bus.say(Kind.STATUS, 11.0, trial=1, elapsed=11.0, tasks={"a": task}, robots={}, **RUNNING)
+    assert unworkable(bus.story, "a") == said
+
+
+def test_who_did_what_the_robot_did_not_decide_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    bus = Bus()
+    bus.decide("activate", "free", 1.0, elapsed=1.0)
+    Answer(Window("right", "a"), as_json=False).past(bus.story, None, goes_on=False)
+    assert capsys.readouterr().out == "right has decided nothing about a; left did\n"
