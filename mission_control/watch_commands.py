@@ -51,6 +51,8 @@ def why(
     from mission_control.watch.window import Window, instant
 
     window = Window(robot, task, instant(begins), float("inf") if ends is None else instant(ends))
+    if window.ends < window.begins:
+        raise UserError(f"--to {ends} is before --from {begins}; expected an instant after it")
     answer = Answer(window, as_json=as_json)
     if bag is None:
         run_until_told(live(mission, connect, keys, answer, follow=follow))

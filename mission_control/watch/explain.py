@@ -245,14 +245,21 @@ _REASONS: dict[Cause, Callable[[_Facts], list[str]]] = {
 }
 
 
-def unmoved(robot: str, task: str, factors: Mapping[str, Any]) -> str:
-    """Why `robot` is not on `task` just now, from the factors of its motivation for it."""
-    return f"{robot} is not on {task} now: {'; '.join(_obstacles(factors))}"
+def unmoved(robot: str, task: str, factors: Mapping[str, Any], unworkable: str) -> str:
+    """Why `robot` is not on `task` just now, from the factors of its motivation for it.
+
+    Args:
+        robot: its name.
+        task: the same.
+        factors: as the robot said them.
+        unworkable: what the task is where sensory feedback says that it does not apply.
+    """
+    return f"{robot} is not on {task} now: {'; '.join(_obstacles(factors, unworkable))}"
 
 
-def _obstacles(factors: Mapping[str, Any]) -> list[str]:
+def _obstacles(factors: Mapping[str, Any], unworkable: str) -> list[str]:
     if factors.get("sensory_feedback") == 0:
-        return ["the task is complete or cannot be worked on just now"]
+        return [f"the task {unworkable}"]
     own, best = _number(factors.get("own_time")), _number(factors.get("best_time"))
     compared = (
         "" if own is None or best is None else f" (its own time {own:.1f} s, the best of those present {best:.1f} s)"

@@ -49,7 +49,7 @@ class Answer:
         if self._as_json:
             return
         if not found and not goes_on:
-            typer.echo(self._nothing())
+            typer.echo(printable(self._nothing(story)))
         if now is not None:
             typer.echo(printable(now))
 
@@ -58,12 +58,14 @@ class Answer:
         trial = f"trial {one.trial}, " if one.trial > 1 else ""
         typer.echo(json.dumps(plain(one)) if self._as_json else printable(trial + tell(one), LONGEST))
 
-    def _nothing(self) -> str:
+    def _nothing(self, story: Story) -> str:
         who = self.window.robot or "nobody"
         about = f" about {self.window.task}" if self.window.task else ""
         decided = "has decided nothing" if self.window.robot else "has decided anything"
         span = "" if self.window == Window(self.window.robot, self.window.task) else " in that time"
-        return f"{who} {decided}{about}{span}"
+        others = sorted({str(one.robot) for one in story.decisions(task=self.window.task)})
+        aside = f"; {', '.join(others)} did" if self.window.task and not span and others else ""
+        return f"{who} {decided}{about}{span}{aside}"
 
 
 #: Letters of a sentence that are printed.
@@ -123,7 +125,15 @@ async def _now(onlooker: Onlooker, story: Story, window: Window) -> str | None:
     if task in seen.attempts:
         return f"{seen.name} is on {task} now"
     factors = seen.motivations.sets.get(task) if seen.motivations is not None else None
-    return None if factors is None else unmoved(seen.name, task, factors)
+    return None if factors is None else unmoved(seen.name, task, factors, unworkable(story, task))
+
+
+def unworkable(story: Story, task: str) -> str:
+    """Why nobody can work on a task that does not apply, as far as the world says."""
+    found = story.tasks.get(task) if story.status is not None else None
+    if found is None or (found.applicable and not found.complete):
+        return "is complete or cannot be worked on just now"
+    return "is complete" if found.complete else "cannot be worked on just now"
 
 
 async def further(onlooker: Onlooker, story: Story) -> AsyncIterator[Happened]:

@@ -17,6 +17,7 @@ from mission_control.watch.rates import Arrivals, Rate
 from mission_control.watch.sighting import Sighting
 from mission_control.watch.story import Story
 from mission_control.watch.window import Window, instant
+from mission_control.watch_commands import why
 
 HEADER = {"incarnation": 1, "seq": 1, "at": 5.0}
 
@@ -36,6 +37,11 @@ def test_an_instant_is_seconds_or_minutes_and_seconds(text: str, seconds: float)
 def test_what_is_no_instant_is_refused(text: str) -> None:
     with pytest.raises(UserError, match="is no instant; expected seconds since the trial began"):
         instant(text)
+
+
+def test_an_end_before_the_beginning_is_refused() -> None:
+    with pytest.raises(UserError, match=r"--to 2:10 is before --from 2:14; expected an instant after it"):
+        why(begins="2:14", ends="2:10")
 
 
 def test_a_window_holds_what_is_asked_about_in_its_order() -> None:
