@@ -112,6 +112,14 @@ def test_a_crash_injected_by_clicking_and_the_takeover_after_it(processes: Proce
     assert "process is gone" in timeline_tells(page, "mole on dig")
     expect(page.locator("#faults-rows")).to_contain_text("crash of mole")
 
+    page.locator("#matrix").press("ArrowDown")
+    expect(page.locator("#tip")).to_have_text("mole hears nobody: it is not there.")
+    page.locator("#decisions-rows").press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    expect(page.locator("#decisions-rows li:nth-child(2) button")).to_be_focused()
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.closest('#faults') !== null")
+
     page.locator("#slider").focus()
     page.keyboard.press("Home")
     for _ in range(20):

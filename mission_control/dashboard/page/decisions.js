@@ -9,7 +9,17 @@ export class Decisions {
     this.mission = mission;
     this.list = get("decisions-rows");
     this.list.tabIndex = 0;
+    this.list.addEventListener("keydown", (event) => this.step(event));
     this.key = "";
+  }
+
+  /** Up and down go from one to the next: Tab passes all of them at once. */
+  step(event) {
+    if (event.key !== "ArrowDown" && event.key !== "ArrowUp") return;
+    event.preventDefault();
+    const rows = [...this.list.querySelectorAll("button")];
+    const next = rows.indexOf(document.activeElement) + (event.key === "ArrowDown" ? 1 : -1);
+    rows[Math.min(Math.max(next, 0), rows.length - 1)]?.focus();
   }
 
   render() {
@@ -29,7 +39,7 @@ export class Decisions {
 
   row(one) {
     const time = make("time", {}, seconds(one.elapsed));
-    const go = make("button", { type: "button", onclick: () => this.mission.show(one.from) }, time, make("span", {}, one.text));
+    const go = make("button", { type: "button", tabindex: "-1", onclick: () => this.mission.show(one.from) }, time, make("span", {}, one.text));
     return make("li", { class: `told-${one.kind}`, "data-id": one.id }, go);
   }
 }

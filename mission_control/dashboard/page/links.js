@@ -34,11 +34,11 @@ export class Links {
     const layout = (this.laid = this.layout());
     if (layout.width <= 0 || layout.height <= 0) return;
     const pen = paper(this.canvas, layout.width, layout.height);
-    const { robots, scene } = this.mission;
+    const { robots } = this.mission;
     this.heads(pen, robots, layout);
     const gap = layout.named ? 2 : 0;
-    if (layout.named) this.cells(pen, robots, scene.links, layout, gap);
-    else this.mosaic(pen, robots, scene.links, layout);
+    if (layout.named) this.cells(pen, robots, layout, gap);
+    else this.mosaic(pen, robots, layout);
     if (this.current) {
       const [i, j] = this.current;
       pen.strokeStyle = ink.ink;
@@ -47,10 +47,16 @@ export class Links {
     }
   }
 
+  /** Whom a robot hears. One that is gone hears nobody, whatever it reported last. */
+  heard(hearer) {
+    const { links, robots } = this.mission.scene;
+    return (robots[hearer]?.present === false ? null : links[hearer]) ?? NONE;
+  }
+
   /** Of a small team, each pair with words. */
-  cells(pen, robots, links, layout, gap) {
+  cells(pen, robots, layout, gap) {
     robots.forEach((hearer, i) => {
-      const heard = links[hearer] ?? NONE;
+      const heard = this.heard(hearer);
       robots.forEach((speaker, j) => {
         const x = layout.side + j * layout.cell;
         const y = layout.head + i * layout.row;
@@ -60,14 +66,14 @@ export class Links {
   }
 
   /** Of a large team, each pair as a point of a picture, which is drawn as a whole. */
-  mosaic(pen, robots, links, { side, head, cell, row }) {
+  mosaic(pen, robots, { side, head, cell, row }) {
     const count = robots.length;
     if (this.picture?.width !== count) this.picture = new OffscreenCanvas(count, count);
     const inner = this.picture.getContext("2d");
     const image = inner.createImageData(count, count);
     const [ground, empty, full, silent] = [ink.grid, ink.sunk, ink.heat, ink.bad].map(channels);
     for (let i = 0; i < count; i++) {
-      const heard = links[robots[i]] ?? NONE;
+      const heard = this.heard(robots[i]);
       for (let j = 0; j < count; j++) {
         const link = heard[robots[j]];
         const lost = link?.[1] ?? 0;
@@ -163,7 +169,8 @@ export class Links {
 
   describe(hearer, speaker) {
     if (hearer === speaker) return hearer;
-    const link = unpack(this.mission.scene.links[hearer]?.[speaker]);
+    if (this.mission.scene.robots[hearer]?.present === false) return `${hearer} hears nobody: it is not there.`;
+    const link = unpack(this.heard(hearer)[speaker]);
     if (!link) return `${hearer} hears ${speaker}: nothing is known. They may share no task.`;
     const lost = link.lost === null ? "it is not known how much was lost" : `${percent(link.lost)} lost of late`;
     const silence = link.silence === null ? "not heard in this trial" : `last heard ${seconds(link.silence)} ago`;
