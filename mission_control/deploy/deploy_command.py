@@ -32,7 +32,7 @@ def compose(
     ] = None,
     speed: Speed = 1.0,
 ) -> None:
-    """Print the compose file of a mission: router, world server, one service for each robot, and two tools."""
+    """Print the compose file of a mission: router, world server, one service for each robot, and what an operator needs."""
     from mission_control.deploy.compose import compose as compose_of
     from mission_control.deploy.documents import as_text
     from mission_control.deploy.team_keys import check_team
@@ -84,6 +84,9 @@ def _warn(path: Path, mission: "Mission", *, fail: str, start: str) -> None:
     """
     from lalliance_agents.faults import Crash, Hang
 
+    named = [mission.environment.kind, *(robot.behaviors for robot in mission.robots.values())]
+    if own := sorted({name.partition(":")[0] for name in named if name is not None and ":" in name}):
+        warn(f"{path}: the image holds no code of yours; use one of your own, FROM lalliance, with {', '.join(own)}")
     if any(isinstance(fault, Crash | Hang) for fault in mission.faults):
         warn(f"{path}: crashes and hangs that the mission plans never fire here; use {fail}")
     if later := [f"robot-{name} at {robot.joins:g} s" for name, robot in mission.robots.items() if robot.joins > 0]:

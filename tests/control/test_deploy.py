@@ -41,6 +41,14 @@ def test_the_compose_file_that_is_shipped_is_the_one_that_is_generated(processes
     assert processes.run(*words.split()).stdout == shipped
 
 
+def test_a_mission_with_code_of_its_own_says_that_the_image_has_none(processes: Processes) -> None:
+    mission = "name: own\ntasks: {t: }\nrobots: {r: {tasks: {t: 30}, behaviors: 'mine:behaviors'}}\n"
+    (processes.folder / "own.yaml").write_text(mission)
+    assert processes.run("deploy", "compose", "own.yaml").stderr == (
+        "lalliance: warning: own.yaml: the image holds no code of yours; use one of your own, FROM lalliance, with mine\n"
+    )
+
+
 def test_every_robot_has_a_service_with_its_own_keys_alone(processes: Processes) -> None:
     done = processes.run("deploy", "compose", "pair.yaml", "--folder", "elsewhere/deep")
     assert done.returncode == 0
