@@ -293,8 +293,13 @@ class Mission(Record):
                 else f"not given; the default of {delay:g} s"
             )
             found.append(
-                f"parameters.max_delay: {value} is {delay / mean:.0%} of the mean task time ({mean:.3g} s); above 5 % robots "
-                f"spend a noticeable part of the mission waiting; {0.04 * mean:.1g} s is about right"
+                f"parameters.max_delay: {value} is {100 * delay / mean:.0f} % of the mean task time ({mean:.3g} s); above 5 % "
+                f"robots spend a noticeable part of the mission waiting; {0.04 * mean:.1g} s is about right"
+            )
+        if self.parameters.silence_timeout >= self.deadline:
+            found.append(
+                f"parameters.silence_timeout: with {exact(self.parameters.silence_timeout)} s no failure is noticed before the "
+                f"deadline of {exact(self.deadline)} s"
             )
         for task in self.tasks:
             fastest = min(self.robots[robot].tasks[task] for robot in self.able(task))

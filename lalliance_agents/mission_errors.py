@@ -238,7 +238,8 @@ def _judge(kind: str, context: dict[str, Any], spot: Spot, message: str) -> tupl
         return wrong, f"expected {_one_of(options)}{like(str(spot.value), options)}"
     if kind == "string_pattern_mismatch":
         fault, wanted = _PATTERNS.get(context["pattern"], ("is not allowed", f"text that matches {context['pattern']}"))
-        return f"{show(spot)} {fault}", f"expected {wanted}"
+        colon = ", and a space after a colon" if context["pattern"] == NAME_PATTERN and ":" in str(spot.value) else ""
+        return f"{show(spot)} {fault}", f"expected {wanted}{colon}"
     if kind in _EXPECTED:
         limits = {name: f"{limit:.15g}" if isinstance(limit, float) else limit for name, limit in context.items()}
         return _compare(kind, _EXPECTED[kind].format_map(limits), spot)
@@ -262,8 +263,11 @@ def _remedy(wanted: str, spot: Spot) -> str:
         return f", in quotes: '{short(spot.text)}'"
     if wanted == "a list" and isinstance(spot.value, str):
         return f", as in [{short(spot.value)}]"
-    if "number" in wanted and isinstance(spot.value, str) and re.fullmatch(r"[-+]?\d+(\.\d*)?", spot.value):
-        return " without quotes"
+    if wanted == "a mapping" and isinstance(spot.value, list) and spot.value and isinstance(spot.value[0], str):
+        return f", as in {{{short(spot.value[0])}: ...}}"
+    number = re.fullmatch(r"[-+]?\d+(\.\d*)?( *[a-zA-Z%]+)?", spot.value) if isinstance(spot.value, str) else None
+    if "number" in wanted and number is not None:
+        return " without a unit" if number[2] else " without quotes"
     return ""
 
 

@@ -202,6 +202,7 @@ class MissionText:
             mark = error.problem_mark or error.context_mark
             where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
             problem = "not readable as YAML: " + ", ".join(filter(None, (error.context, error.problem)))
+            problem += next((f"; {remedy}" for found, remedy in _REMEDIES.items() if found in problem), "")
         except yaml.reader.ReaderError as error:
             start = text.rfind("\n", 0, error.position) + 1
             where = f":{text.count(chr(10), 0, start) + 1}:{error.position - start + 1}"
@@ -213,6 +214,15 @@ class MissionText:
         first, more = ordered[0], f" (and {len(ordered) - 1} more)" if len(ordered) > 1 else ""
         place = f"{dotted(first.place)}: " if first.place else ""
         return MissionError(one_line(f"{self.source}:{first.line}: {place}{first.sentence}{more}"))
+
+
+#: How to mend what YAML complains of in words of its own, by a part of these.
+_REMEDIES = {
+    "character '\\t'": "expected spaces instead of the tab",
+    "mapping values are not allowed": "expected a space after each colon, quotes around text with a colon, and the entries "
+    "of one mapping at the same indentation",
+    "expected <block end>": "expected the entries of one mapping or list at the same indentation",
+}
 
 
 class _Loader(yaml.SafeLoader):

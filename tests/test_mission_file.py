@@ -104,11 +104,16 @@ NOT_A_DOCUMENT = {
     "# nothing\n": "x.yaml: the file is empty; expected a mission",
     "~": "x.yaml:1: the file holds nothing; expected a mapping with name, tasks and robots",
     "\n- a\n": "x.yaml:2: the file holds a list; expected a mapping with name, tasks and robots",
-    "a: b: c": "x.yaml:1:5: not readable as YAML: mapping values are not allowed here",
+    "a: b: c": "x.yaml:1:5: not readable as YAML: mapping values are not allowed here; expected a space after each "
+    "colon, quotes around text with a colon, and the entries of one mapping at the same indentation",
+    "a:\n  b: 1\n   c: 2": "x.yaml:3:5: not readable as YAML: mapping values are not allowed here; expected a space after "
+    "each colon, quotes around text with a colon, and the entries of one mapping at the same indentation",
+    "a:\n  b: {}\n   c: {}": "x.yaml:3:4: not readable as YAML: while parsing a block mapping, expected <block end>, but "
+    "found '<block mapping start>'; expected the entries of one mapping or list at the same indentation",
     "a:\n  [1": "x.yaml:2:5: not readable as YAML: while parsing a flow sequence, expected ',' or ']', "
     "but got '<stream end>'",
     "a: 1\n\tb: 2": "x.yaml:2:1: not readable as YAML: while scanning for the next token, found character '\\t' "
-    "that cannot start any token",
+    "that cannot start any token; expected spaces instead of the tab",
     "a: *x": "x.yaml:1:4: not readable as YAML: found undefined alias 'x'",
     "a: 1\n---\nb: 2\n": "x.yaml:2:1: not readable as YAML: expected a single document in the stream, "
     "but found another document",
@@ -142,7 +147,7 @@ REPLACED = {
     ("name: depot", "name: ''"): "1: name: '' is not a name; expected 1 to 64 of A-Z a-z 0-9 _ -",
     ("name: depot", "name: dépôt"): "1: name: 'dépôt' is not a name; expected 1 to 64 of A-Z a-z 0-9 _ -",
     ("depot", "x" * 65): f"1: name: '{'x' * 55} ... is not a name; expected 1 to 64 of A-Z a-z 0-9 _ -",
-    ("{a: {}, b: {after: [a]}}", "[a, b]"): "2: tasks: ['a', 'b'] is a list; expected a mapping",
+    ("{a: {}, b: {after: [a]}}", "[a, b]"): "2: tasks: ['a', 'b'] is a list; expected a mapping, as in {a: ...}",
     ("[a]", "a"): "2: tasks.b.after: 'a' is text; expected a list, as in [a]",
     ("[a]", "[c]"): "2: tasks.b.after.0: 'c' is not a task of this mission",
     ("[a]", "[a, a]"): "2: tasks.b.after.1: 'a' is listed twice; expected it once",
@@ -156,6 +161,8 @@ REPLACED = {
     ("{a: 8, b: 4}", "{}"): "5: robots.r1.tasks: {} is not allowed; expected 1 or more entries",
     ("a: 8", "a: -3"): "5: robots.r1.tasks.a: -3 is not allowed; expected a number greater than 0",
     ("a: 8", "a: eight"): "5: robots.r1.tasks.a: 'eight' is text; expected a number",
+    ("a: 8", "a: 8s"): "5: robots.r1.tasks.a: '8s' is text; expected a number without a unit",
+    ("a: 8", "a: 8.5 min"): "5: robots.r1.tasks.a: '8.5 min' is text; expected a number without a unit",
     ("a: 8", "a: '8'"): "5: robots.r1.tasks.a: '8' is text; expected a number without quotes",
     ("a: 8", "a: yes"): "5: robots.r1.tasks.a: yes is a truth value; expected a number",
     ("a: 8", "a: [8]"): "5: robots.r1.tasks.a: [8] is a list; expected a number",
@@ -169,6 +176,8 @@ REPLACED = {
     "or text in quotes: '010'",
     ("a: 8", "aa: 8"): "5: robots.r1.tasks.aa: 'aa' is not a task of this mission; did you mean 'a'?",
     ("a: 8", "a/b: 8"): "5: robots.r1.tasks: 'a/b' is not a name; expected 1 to 64 of A-Z a-z 0-9 _ -",
+    ("{a: 8, b: 4}", "{a:8}"): "5: robots.r1.tasks: 'a:8' is not a name; expected 1 to 64 of A-Z a-z 0-9 _ -, and a "
+    "space after a colon (and 1 more)",
     ("a: 8", "1: 8"): "5: robots.r1.tasks: the key 1 is a number in YAML; expected text in quotes: '1'",
     ("a: 8", "a: 8, a: 9"): "5: robots.r1.tasks.a: given twice, in line 5; expected it once",
     ("{b: 9}", "{b: 9}, joins: 700"): "6: robots.r2.joins: 700 s is not before the mission's deadline; "
@@ -347,6 +356,13 @@ def test_a_task_without_a_robot_before_the_last_trial_is_warned_of() -> None:
     assert parse_mission(text, "x.yaml").warnings() == []
     trained = parse_mission(text + "phases: [{learning: active}, {}]", "x.yaml")
     assert trained.warnings() == ["tasks.a: its robots join in the last trial; those before it cannot complete"]
+
+
+def test_a_silence_timeout_in_milliseconds_is_warned_of() -> None:
+    text = DEPOT + "parameters: {max_delay: 0.3, silence_timeout: 1000}\n"
+    assert parse_mission(text, "x.yaml").warnings() == [
+        "parameters.silence_timeout: with 1000 s no failure is noticed before the deadline of 600 s"
+    ]
 
 
 def test_a_lone_robot_has_no_links() -> None:
