@@ -118,9 +118,12 @@ def load_behaviors(place: str) -> list[BehaviorSet]:
     """
     factory = find_factory(place)
     try:
-        sets = list(factory())
+        made: object = factory()
+        sets = list(made) if isinstance(made, Iterable) else None
     except (Exception, SystemExit) as error:
         raise BehaviorError(f"behaviors {place!r} failed: {_told(error)}") from error
+    if sets is None:
+        raise BehaviorError(f"behaviors {place!r} returned {described(made)}, expected a list of behaviour sets")
     for one in sets:
         if not isinstance(one, BehaviorSet):
             raise BehaviorError(f"behaviors {place!r} returned {described(one)}, expected instances of BehaviorSet")

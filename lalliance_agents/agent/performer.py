@@ -6,8 +6,10 @@ after it was stopped, return or fail, says nothing about its task any more.
 """
 
 import asyncio
+import inspect
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
+from typing import Any
 
 from lalliance_agents.agent.behavior import BehaviorSet, described
 
@@ -61,7 +63,7 @@ class Performer:
     async def _perform(self, one: BehaviorSet, before: set[asyncio.Task[None]]) -> None:
         await self._let_end(before)
         try:
-            await one.perform()
+            await _begun(one)
         except (Exception, SystemExit) as error:
             self._tell(one, error)
             if not _is_stopped():
@@ -99,6 +101,13 @@ class Performer:
         """Cancel what runs and wait for it to clean up, within the limit."""
         self.stop_all()
         await self._let_end(set(self._ending))
+
+
+def _begun(one: BehaviorSet) -> Awaitable[Any]:
+    working: object = one.perform()
+    if not inspect.isawaitable(working):
+        raise TypeError(f"perform of {described(one)} is an ordinary function; expected async def perform")
+    return working
 
 
 def _is_stopped() -> bool:

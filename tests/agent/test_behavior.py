@@ -71,7 +71,7 @@ def test_a_factory_is_found_and_called(place: str) -> None:
         ("my_behaviors:number", "is int, expected a function that returns behaviour sets"),
         ("my_behaviors:failing", "failed: RuntimeError: no robot arm"),
         ("my_behaviors:failing_late", "failed: RuntimeError: no gripper"),
-        ("my_behaviors:nothing", "failed: TypeError: 'NoneType' object is not iterable"),
+        ("my_behaviors:nothing", "returned None, expected a list of behaviour sets"),
         ("my_behaviors:needy", "failed: TypeError: needy() missing 1 required positional argument: 'port'"),
         ("my_behaviors:wrong", "returned 'push', expected instances of BehaviorSet"),
         ("my_behaviors:nameless", "returned <Nameless>, expected instances of BehaviorSet"),

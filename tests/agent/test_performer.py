@@ -141,6 +141,18 @@ async def test_return_and_failure_are_reported_and_leave_the_set_on_its_task(cap
     assert "jammed" in caplog.text
 
 
+async def test_a_perform_that_is_not_async_is_told_so(caplog: pytest.LogCaptureFixture) -> None:
+    class Plain(BehaviorSet):
+        def perform(self) -> None:  # type: ignore[override]
+            """What a beginner writes."""
+
+    body = Body()
+    body.performer.start(Plain("a"))
+    await settle()
+    assert body.log == ["a failed"]
+    assert "perform of <Plain for a> is an ordinary function; expected async def perform" in caplog.text
+
+
 async def test_what_a_set_does_after_it_was_stopped_says_nothing_about_its_task(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
