@@ -15,7 +15,7 @@ from pydantic import BaseModel, Tag
 from pydantic_core import ErrorDetails
 
 from lalliance_agents.config import ENVIRONMENT_PATTERN, FACTORY_PATTERN, like
-from lalliance_agents.faults import GLOB_PATTERN
+from lalliance_agents.faults import GLOB_PATTERN, LinkFault, Partition
 from lalliance_agents.model.parameters import Parameters
 from lalliance_agents.wire.keys import NAME_PATTERN
 
@@ -55,6 +55,8 @@ _EXPECTED = {
     "string_too_long": "text of at most {max_length} characters",
 }
 
+#: What is taken for the kind of a fault, and is one of the fields that stand in its place.
+_WITHOUT_KIND = LinkFault.model_fields.keys() | Partition.model_fields.keys()
 #: How the kinds of errors end that say: this is another kind of value.
 _OF_KIND = ("_type", "_parsing")
 
@@ -235,7 +237,8 @@ def _judge(kind: str, context: dict[str, Any], spot: Spot, message: str) -> tupl
         options = reason.removeprefix("expected one of ").split(", ")
         return (wrong, reason + like(str(spot.value), options)) if reason.startswith("expected ") else (reason, "")
     if options := re.findall(r"'([^']*)'", str(context.get("expected", context.get("expected_tags", "")))):
-        return wrong, f"expected {_one_of(options)}{like(str(spot.value), options)}"
+        aside = f"; {spot.value} is a field without a kind" if str(spot.value) in _WITHOUT_KIND else ""
+        return wrong, f"expected {_one_of(options)}{aside or like(str(spot.value), options)}"
     if kind == "string_pattern_mismatch":
         fault, wanted = _PATTERNS.get(context["pattern"], ("is not allowed", f"text that matches {context['pattern']}"))
         colon = ", and a space after a colon" if context["pattern"] == NAME_PATTERN and ":" in str(spot.value) else ""

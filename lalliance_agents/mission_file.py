@@ -123,7 +123,7 @@ def load_mission_text(path: Path) -> "MissionText":
             return MissionText(raw.decode(), str(path))
         reason = _TOO_LARGE
     except FileNotFoundError:
-        reason = "no such file"
+        reason = "no such file; expected a mission file"
     except IsADirectoryError:
         reason = "a directory; expected a mission file"
     except UnicodeDecodeError as error:

@@ -270,6 +270,8 @@ ADDED = {
     "faults: [{at: -3, link: {}, loss: 0.5}]": "faults.0.at: -3 is not allowed; expected a number of at least 0",
     "faults: [{at: 3, link: {}, loss: 1.5}]": "faults.0.loss: 1.5 is not allowed; expected a number of at most 1",
     "faults: [{at: 3, link: {}, loss: {enter: 0.1}}]": "faults.0.loss: a field is missing; expected a field 'leave'",
+    "faults: [{at: 3, kind: loss, link: {}, loss: 0.5}]": "faults.0.kind: 'loss' is not allowed; expected one of crash, hang, "
+    "stuck, slow, mute, deaf, blind; loss is a field without a kind",
     "faults: [{at: 3, link: {}, los: 0.5}]": "faults.0.los: unknown field; did you mean 'loss'?",
     "faults: [{at: 3, link: {form: r1}, loss: 0.5}]": "faults.0.link.form: unknown field; did you mean 'from'?",
     "faults: [{at: 3, link: {from: r1}}]": "faults.0: the rule does nothing; expected loss, delay, duplicate, reorder or "
@@ -391,7 +393,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     latin.write_bytes("name: x\n# dépôt".encode("latin-1"))
     large.write_text("#" * (LARGEST + 1))
     expected = {
-        missing: "no such file",
+        missing: "no such file; expected a mission file",
         tmp_path: "a directory; expected a mission file",
         latin: "line 2 is not UTF-8, byte 0xe9; expected a text file in UTF-8",
         large: "larger than 1048576 bytes; expected a mission file",

@@ -94,7 +94,7 @@ def test_a_bad_mission_is_refused_with_its_place_and_what_was_expected(processes
 
 
 COMMANDS = {
-    "missing file": (["check", "no.yaml"], "no.yaml: no such file"),
+    "missing file": (["check", "no.yaml"], "no.yaml: no such file; expected a mission file"),
     "a directory": (["run", "."], ".: a directory; expected a mission file"),
     "an unknown robot": (
         ["robot", "good.yaml", "--name", "three"],

@@ -31,7 +31,7 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
 
 HANG = ["inject", "kind=hang", "robot=left"]
 BAD = {
-    "no mission file": (["no.yaml", "status"], "no.yaml: no such file"),
+    "no mission file": (["no.yaml", "status"], "no.yaml: no such file; expected a mission file"),
     "an unknown kind": (
         ["pair.yaml", "inject", "kind=hnag", "robot=left"],
         "kind: 'hnag' is not allowed; expected one of crash, hang, stuck, slow, mute, deaf, blind; did you mean 'hang'?",

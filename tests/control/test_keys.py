@@ -70,7 +70,7 @@ def test_keys_are_not_replaced(processes: Processes, keys: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["no.yaml"], "no.yaml: no such file"),
+        (["no.yaml"], "no.yaml: no such file; expected a mission file"),
         (["pair.yaml", "--host", "ü"], "'ü' is not a host; expected a host name in ASCII, or an IP address"),
         (
             ["pair.yaml", "--keys", "pair.yaml/keys"],

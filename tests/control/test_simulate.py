@@ -126,7 +126,7 @@ def test_no_optimum_is_told_without_the_study_extra(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["no.yaml"], "lalliance: no.yaml: no such file\n"),
+        (["no.yaml"], "lalliance: no.yaml: no such file; expected a mission file\n"),
         ([HANDLING, "--runs", "3", "--events"], "lalliance: --events shows one run; expected --runs 1, not 3\n"),
     ],
 )
