@@ -24,7 +24,6 @@ from mission_control.chaos import chaos
 from mission_control.dashboard.command import PORT, Port, dashboard
 from mission_control.deploy.deploy_command import deploy
 from mission_control.deploy.keys_command import keys as keys_command
-from mission_control.hosting import check_shareable
 from mission_control.keeping import tell
 from mission_control.record_command import bag, check_extra, new_recording, record, replay
 from mission_control.shell import (
@@ -126,6 +125,8 @@ def run(
     if processes is not None and processes >= len(mission.robots):
         processes = None
     if processes is not None:
+        from mission_control.hosting import check_shareable
+
         check_shareable(path, mission, keys)
     console = Console(stderr=as_json)
     if learned is not None:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lalliance_agents.errors import UserError
-from mission_control.hosting import check_certificate, named, told
 from mission_control.keeping import check_place, keep, kept_summary, tell
 from mission_control.shell import (
     AsJson,
@@ -166,6 +165,8 @@ def robot(
     parent: Parent = None,
 ) -> None:
     """Run one robot of a mission, or several in one process, until the mission is over."""
+    from mission_control.hosting import check_certificate, named, told
+
     follow(parent)
     mission = load_part(path, seed, part="robot")
     chosen = named(path, mission, names)

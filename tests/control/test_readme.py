@@ -1,6 +1,8 @@
 """What the README and short pages show, done as they say."""
 
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -105,3 +107,10 @@ def test_every_command_of_the_tool_is_in_the_readme(processes: Processes) -> Non
     assert len(listed) == 22
     text = (ROOT / README).read_text()
     assert [name for name in listed if f"lalliance {name}" not in text] == []
+
+
+def test_the_commands_are_there_before_anything_that_takes_long_to_import() -> None:
+    heavy = {"pydantic", "numpy", "zenoh", "msgpack", "rich.live", "yaml"}
+    code = f"import sys, mission_control.cli; print({heavy!r} & sys.modules.keys())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "set()\n", "")
