@@ -10,11 +10,11 @@ CHROMIUM = Path("/usr/bin/chromium")
 
 #: In the order in which they run and are shown: the name of the program, and what it is told besides `--json` or `--quick`.
 BENCHMARKS: dict[str, list[str]] = {
-    "bus": [],
-    "codec": [],
-    "start_up": [],
     "team_size": [],
     "failover": [],
+    "start_up": [],
+    "bus": [],
+    "codec": [],
     "simulator": [],
     "kernel": [],
     "peers": [],

@@ -28,7 +28,7 @@ def test_the_page_is_what_the_figures_give():
 def test_a_benchmark_that_is_not_there_is_named():
     refused = run("all", "speed")
     assert refused.returncode == 2
-    assert "speed: no such benchmark; expected bus, " in refused.stderr
+    assert "speed: no such benchmark; expected team_size, " in refused.stderr
 
 
 @pytest.mark.parametrize("name", ["bus", "codec", "start_up"])
