@@ -24,13 +24,13 @@ def docker(*words: str, check: bool = True, timeout: float = PATIENCE) -> str:
     return done.stdout.strip()
 
 
-def until(condition: Callable[[], Any], what: str, *, seconds: float = PATIENCE) -> Any:
-    """Look until `condition` gives something; that."""
+def until(condition: Callable[[], Any], what: str | Callable[[], str], *, seconds: float = PATIENCE) -> Any:
+    """Look until `condition` gives something; that. If it never does, `what` it was is told."""
     end = time.monotonic() + seconds
     while True:
         if found := condition():
             return found
-        assert time.monotonic() < end, f"not within {seconds:g} s: {what}"
+        assert time.monotonic() < end, f"not within {seconds:g} s: {what if isinstance(what, str) else what()}"
         time.sleep(0.05)
 
 
@@ -100,7 +100,7 @@ class Deployment:
     def wait_for(self, pattern: str, since: int = 0) -> "re.Match[str]":
         """Wait for an event that matches, if there was none yet after the first `since`."""
         found: re.Match[str] = until(
-            lambda: self.happened(pattern, since), f"{pattern} in\n{chr(10).join(self._events[-40:])}"
+            lambda: self.happened(pattern, since), lambda: f"{pattern} in\n{chr(10).join(self._events[-40:])}"
         )
         return found
 

@@ -99,6 +99,9 @@ def test_whatever_fails_the_mission_goes_on(deployed) -> None:
     team.run("pause", f"robot-{robot}")
     team.wait_for(rf"takes {task} from {robot} \(silence\)", since=before)
     team.run("unpause", f"robot-{robot}")
+    # It would go on with its task, without a word if its presence had ended meanwhile: which robot is where is to be known.
+    team.run("restart", "--timeout", "1", f"robot-{robot}")
+    until(lambda robot=robot: robot not in team.workers(), f"{robot} is off {task}")
 
     robot, task, before = alone()
     with team.disconnected(f"robot-{robot}"):
