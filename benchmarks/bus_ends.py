@@ -243,7 +243,7 @@ def publish(endpoint: str, *, direct: bool) -> None:
         to = {task: declare(KEYS.build(Kind.ACTIVITY, task=task, robot=SENDER)) for task in (PACED, FLOOD)}
         while not all(publisher.matching_status.matching for publisher in to.values()):
             time.sleep(0.002)
-        time.sleep(0.05)
+        time.sleep(0.05)  # the first message is not to overtake the last of the declarations
         _tell("ready")
         for line in sys.stdin:
             what, seconds = line.split()

@@ -114,7 +114,7 @@ class Ear(MemoryBus):
 
     handler: Handler
 
-    async def subscribe(self, pattern: str, handler: Handler) -> Registration:  # type: ignore[override]
+    async def subscribe(self, pattern: str, handler: Handler) -> Registration:  # type: ignore[override]  # MemoryBus promises its own kind of registration, which nobody here needs
         """Keep the handler, too."""
         self.handler = handler
         return await super().subscribe(pattern, handler)

@@ -36,6 +36,8 @@ knowledge: given
 parameters: {min_delay: 0.1, max_delay: 0.4}
 """
 LIMIT = 30.0
+#: What was said before a death has come after so long, in seconds.
+UNDER_WAY = 0.05
 COLUMNS = {
     "killed": lambda row: row["killed"],
     "times": lambda row: str(len(row["seconds"])),
@@ -102,18 +104,22 @@ async def until(condition: Callable[[], object]) -> None:
             await asyncio.sleep(0.002)
 
 
+async def _heard_anew(team: Team, kind: Kind, killed: float) -> float:
+    """From the instant of a death until something of `kind` is heard that was not under way then."""
+    await asyncio.sleep(UNDER_WAY)
+    return await team.heard_after(kind, killed + UNDER_WAY) + UNDER_WAY
+
+
 async def router(team: Team) -> float:
     """From the router's death until a robot is heard again."""
     killed = team.kill("router")
-    await asyncio.sleep(0.05)  # what was under way
-    return await team.heard_after(Kind.ACTIVITY, killed + 0.05) + 0.05
+    return await _heard_anew(team, Kind.ACTIVITY, killed)
 
 
 async def world(team: Team) -> float:
     """From the world server's death until it is heard again."""
     killed = team.kill("world")
-    await asyncio.sleep(0.05)
-    return await team.heard_after(Kind.STATUS, killed + 0.05) + 0.05
+    return await _heard_anew(team, Kind.STATUS, killed)
 
 
 async def robots(team: Team) -> float:
@@ -142,7 +148,7 @@ async def measured(measure: Callable[[Team], Coroutine[None, None, float]], path
     watching = asyncio.create_task(team.watch())
     try:
         await until(lambda: {"ACTIVITY", "STATUS"} <= team.heard.keys())
-        await asyncio.sleep(1.0)
+        await asyncio.sleep(1.0)  # both are at work, and nothing of the start is under way
         return await measure(team)
     finally:
         watching.cancel()

@@ -110,6 +110,7 @@ def run(
     """Run a mission here: router, world and robots as processes."""
     from rich.console import Console
 
+    from mission_control.hosting import shared_processes
     from mission_control.launch import Beginning, Launcher, Plan
     from mission_control.yardstick import with_optimum
     from world_server.history import recall
@@ -122,27 +123,14 @@ def run(
     if connect is not None and listen is not None:
         raise UserError("--connect uses a router that runs already, --listen starts one; expected one of the two")
     mission = load_part(path, seed, part="team")
-    if processes is not None and processes >= len(mission.robots):
-        processes = None
-    if processes is not None:
-        from mission_control.hosting import check_shareable
-
-        check_shareable(path, mission, keys)
-    console = Console(stderr=as_json)
-    if learned is not None:
-        from lalliance_agents.agent.catalog import prepare
-
-        prepare(learned)
-    if keys is not None:
-        from mission_control.deploy.team_keys import check_team
-
-        check_team(keys, path, mission, with_router=connect is None)
+    processes = shared_processes(path, mission, processes, keys)
+    _prepare_folders(path, mission, learned, keys, with_router=connect is None)
     warn_of(path, mission)
     if (real := mission.parameters.silence_timeout / speed) < SHORTEST_SILENCE:
         warn(
             f"--speed {speed:g} makes {real:.2g} real seconds of silence a failure; a busy machine may see some that are none"
         )
-
+    console = Console(stderr=as_json)
     page = _page(path, port, keys, speed) if dashboard_too else None
 
     def plan(kept: Path) -> Plan:
@@ -248,6 +236,20 @@ def _recorded(recorded: Path | None, path: Path, mission: "Mission") -> "Iterato
             yield writer
     except RecordingError as error:
         warn(str(error))
+
+
+def _prepare_folders(
+    path: Path, mission: "Mission", learned: Path | None, keys: Path | None, *, with_router: bool
+) -> None:
+    """Make sure that what is learned can be kept, and that all processes can show who they are."""
+    if learned is not None:
+        from lalliance_agents.agent.catalog import prepare
+
+        prepare(learned)
+    if keys is not None:
+        from mission_control.deploy.team_keys import check_team
+
+        check_team(keys, path, mission, with_router=with_router)
 
 
 def _page(path: Path, port: int, keys: Path | None, speed: float) -> "Page":

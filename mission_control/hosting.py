@@ -37,12 +37,14 @@ def check_certificate(names: Sequence[str], keys: Path | None) -> None:
         )
 
 
-def check_shareable(path: Path, mission: Mission, keys: Path | None) -> None:
-    """Accept a mission whose robots may share processes.
+def shared_processes(path: Path, mission: Mission, processes: int | None, keys: Path | None) -> int | None:
+    """How many processes the robots share; None: each has its own, as there is one for each or nobody wants them to share.
 
     Raises:
-        UserError: it has a fault of one robot's process, or there are keys.
+        UserError: they may not share: the mission has a fault of one robot's process, or there are keys.
     """
+    if processes is None or processes >= len(mission.robots):
+        return None
     check_certificate(list(mission.robots), keys)
     for number, fault in enumerate(mission.faults):
         if isinstance(fault, Crash | Hang):
@@ -50,6 +52,7 @@ def check_shareable(path: Path, mission: Mission, keys: Path | None) -> None:
                 f"{path}: faults.{number}: {describe(fault)} would strike all robots of a process that several share; "
                 "expected no crash and no hang with --processes, or one process per robot"
             )
+    return processes
 
 
 def shares(robots: Sequence[str], processes: int | None) -> list[list[str]]:

@@ -8,6 +8,7 @@ import contextlib
 import gc
 import logging
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,6 +32,8 @@ from mission_control.shell import (
 
 if TYPE_CHECKING:
     from lalliance_agents.agent.runtime import Outcome
+    from lalliance_agents.bus.base import Bus
+    from lalliance_agents.config import Mission
 
 Connect = Annotated[
     str | None,
@@ -188,11 +191,8 @@ def robot(
         }
 
     async def live() -> "list[Outcome]":
-        from lalliance_agents.agent.host import Host
-        from lalliance_agents.agent.runtime import Robot
         from lalliance_agents.bus.session import receive_in_one_thread
         from lalliance_agents.bus.zenoh_bus import open_bus
-        from lalliance_agents.clock import MissionClock
 
         receive_in_one_thread()
         made = {name: options(name) for name in chosen}
@@ -201,19 +201,29 @@ def robot(
             if parent is None:
                 are = "is" if len(chosen) == 1 else "are"
                 typer.echo(f"{told(chosen)} of mission {mission.name} {are} connected to {endpoint}")
-            clock = MissionClock(speed)
-            if len(chosen) == 1:
-                member = Robot(mission, chosen[0], bus=bus, clock=clock, **made[chosen[0]])
-                _keep_all()
-                return [await member.run()]
-            async with Host(mission, bus) as host:
-                for name, how in made.items():
-                    host.take_in(name, clock=clock, **how)
-                _keep_all()
-                return await host.run()
+            return await _live(mission, made, bus, speed)
 
     outcomes = run_until_told(live())
     raise typer.Exit(0 if set(outcomes) == {"complete"} else 1)
+
+
+async def _live(mission: "Mission", made: Mapping[str, dict[str, Any]], bus: "Bus", speed: float) -> "list[Outcome]":
+    """Let robots live, each made as it is told, until the mission is over; how it ended for each."""
+    from lalliance_agents.agent.host import Host
+    from lalliance_agents.agent.runtime import Robot
+    from lalliance_agents.clock import MissionClock
+
+    clock = MissionClock(speed)
+    if len(made) == 1:  # which has nobody to share with, and needs none of what sharing costs
+        [(name, how)] = made.items()
+        member = Robot(mission, name, bus=bus, clock=clock, **how)
+        _keep_all()
+        return [await member.run()]
+    async with Host(mission, bus) as host:
+        for name, how in made.items():
+            host.take_in(name, clock=clock, **how)
+        _keep_all()
+        return await host.run()
 
 
 def health(

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lalliance_study.markdown import renewed
-from made import commands, missions, model, parameters
+from made import commands, examples, missions, model, parameters
 
 ROOT = Path(__file__).parents[2]
 
@@ -15,6 +15,7 @@ PARTS: dict[str, dict[str, Callable[[], str]]] = {
     "docs/missions.md": dict(missions.PARTS),
     "docs/parameters.md": dict(parameters.PARTS),
     "docs/model.md": dict(model.PARTS),
+    "docs/your-robot.md": dict(examples.PARTS),
 }
 
 

@@ -6,5 +6,6 @@ process), in Zenoh's own `threads`; `memory` does it inside one event loop, for 
 them to it. `patterns` spells out which keys a key expression matches. Up to here nobody knows what the payloads mean.
 
 `messenger` does: it sends and takes one participant's checked messages. `link` says what rules do to a message, and `faulty`
-does it to what arrives at one robot, over any bus, with a `delay_line` for what comes late.
+does it to what arrives at one robot, with a `delay_line` for what comes late; `shared` is one bus for several robots of a
+process. Both are `wrapped` around another bus.
 """

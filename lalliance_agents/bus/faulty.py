@@ -18,13 +18,8 @@ import asyncio
 from collections import Counter
 
 from lalliance_agents.bus.base import (
-    Answer,
     Bus,
-    ConnectionHandler,
-    Delivery,
     Handler,
-    PresenceHandler,
-    Publication,
     Registration,
     Sample,
 )
@@ -34,6 +29,7 @@ from lalliance_agents.bus.inbox import Inlet
 from lalliance_agents.bus.link import LinkRules, RuledLink
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.bus.patterns import MAX_KEY, check_pattern, intersects
+from lalliance_agents.bus.wrapped import WrappedBus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.errors import MessageError
 from lalliance_agents.faults import fits
@@ -53,7 +49,7 @@ MOST_EFFECTS = 128
 _Treatment = tuple[Key, RuledLink | Blindness]
 
 
-class FaultyBus(Bus):
+class FaultyBus(WrappedBus):
     """One robot's connection, with faults made on arrival. Obeys no rules before `obey`; closing it closes the inner bus.
 
     Args:
@@ -65,7 +61,7 @@ class FaultyBus(Bus):
     """
 
     def __init__(self, inner: Bus, keys: Keys, me: str, clock: MissionClock, *, decode: Decoder = decode_at) -> None:
-        self._inner = inner
+        super().__init__(inner)
         self._keys = keys
         self._me = me
         self._clock = clock
@@ -113,14 +109,6 @@ class FaultyBus(Bus):
         self._line.discard()
         await self._ear.close()
 
-    def put(self, key: str, payload: bytes, delivery: Delivery) -> None:
-        """Publish without waiting; lost silently while the bus is down."""
-        self._inner.put(key, payload, delivery)
-
-    async def publication(self, key: str, delivery: Delivery) -> Publication:
-        """Declare a key that will be published on often."""
-        return await self._inner.publication(key, delivery)
-
     async def subscribe(self, pattern: str, handler: Handler) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, when and as often as the faults let it come."""
         check_pattern(pattern)
@@ -137,10 +125,6 @@ class FaultyBus(Bus):
 
         return _Subscription(await self._inner.subscribe(pattern, hear), inlet, self._line)
 
-    async def answer(self, pattern: str, handler: Answer) -> Registration:
-        """Answer queries that match `pattern`."""
-        return await self._inner.answer(pattern, handler)
-
     async def query(self, pattern: str, payload: bytes = b"", *, timeout: float) -> list[Sample]:  # noqa: ASYNC109 - see Bus.query
         """Ask whoever answers `pattern`; a blind robot gets what the world senses late, or not at all if not in time."""
         loop = asyncio.get_running_loop()
@@ -156,18 +140,6 @@ class FaultyBus(Bus):
             return answers
         self._ear.dropped[HELD_BACK] += unseen
         return seen
-
-    async def announce_presence(self, key: str) -> Registration:
-        """Be present as `key` until closed or gone, however abruptly."""
-        return await self._inner.announce_presence(key)
-
-    async def watch_presence(self, pattern: str, handler: PresenceHandler) -> Registration:
-        """Have `handler` called with (key, True) for each presence there is or comes, and (key, False) when it is gone."""
-        return await self._inner.watch_presence(pattern, handler)
-
-    async def watch_connection(self, handler: ConnectionHandler) -> Registration:
-        """Have `handler` called with whether the bus is up: now, and whenever that changes."""
-        return await self._inner.watch_connection(handler)
 
     async def close(self) -> None:
         """Discard what is under way and close the inner bus; a second call does nothing."""

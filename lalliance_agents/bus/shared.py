@@ -16,24 +16,20 @@ from collections.abc import Iterable
 from itertools import product
 
 from lalliance_agents.bus.base import (
-    Answer,
     Bus,
-    ConnectionHandler,
-    Delivery,
     Handler,
-    PresenceHandler,
-    Publication,
     Registration,
     Sample,
 )
 from lalliance_agents.bus.inbox import Inlet
 from lalliance_agents.bus.patterns import check_pattern
+from lalliance_agents.bus.wrapped import WrappedBus
 
 #: Keys of which it is remembered whom they are for; whoever makes up keys fills no more than this.
 MOST_KEYS = 2**14
 
 
-class SharedBus(Bus):
+class SharedBus(WrappedBus):
     """A bus for several participants; closing it closes the inner one.
 
     Args:
@@ -41,7 +37,7 @@ class SharedBus(Bus):
     """
 
     def __init__(self, inner: Bus) -> None:
-        self._inner = inner
+        super().__init__(inner)
         self._channels: dict[str, _Channel] = {}
         self._wide: list[_Wide] = []
         self._questions: dict[tuple[str, bytes, float], asyncio.Task[list[Sample]]] = {}
@@ -52,14 +48,6 @@ class SharedBus(Bus):
     def widen(self, patterns: Iterable[str]) -> None:
         """From now on, have subscriptions to what `patterns` match served by one for each of these."""
         self._wide += [_Wide(pattern, self._inner) for pattern in patterns]
-
-    def put(self, key: str, payload: bytes, delivery: Delivery) -> None:
-        """Publish without waiting; lost silently while the bus is down."""
-        self._inner.put(key, payload, delivery)
-
-    async def publication(self, key: str, delivery: Delivery) -> Publication:
-        """Declare a key that will be published on often."""
-        return await self._inner.publication(key, delivery)
 
     async def subscribe(self, pattern: str, handler: Handler) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
@@ -76,10 +64,6 @@ class SharedBus(Bus):
             raise
         return _Share(inlet, channel)
 
-    async def answer(self, pattern: str, handler: Answer) -> Registration:
-        """Answer queries that match `pattern` with the samples that `handler` returns."""
-        return await self._inner.answer(pattern, handler)
-
     async def query(self, pattern: str, payload: bytes = b"", *, timeout: float) -> list[Sample]:  # noqa: ASYNC109 - see Bus.query
         """Ask whoever answers `pattern`; all answers that came within `timeout` seconds, possibly none."""
         question = pattern, payload, timeout
@@ -89,18 +73,6 @@ class SharedBus(Bus):
             self._questions[question] = asking
             asking.add_done_callback(lambda _: self._questions.pop(question))
         return list(await asyncio.shield(asking))
-
-    async def announce_presence(self, key: str) -> Registration:
-        """Be present as `key` until closed or gone, however abruptly."""
-        return await self._inner.announce_presence(key)
-
-    async def watch_presence(self, pattern: str, handler: PresenceHandler) -> Registration:
-        """Have `handler` called with (key, True) for each presence there is or comes, and (key, False) when it is gone."""
-        return await self._inner.watch_presence(pattern, handler)
-
-    async def watch_connection(self, handler: ConnectionHandler) -> Registration:
-        """Have `handler` called with whether the bus is up: now if it is, and whenever that changes."""
-        return await self._inner.watch_connection(handler)
 
     async def close(self) -> None:
         """Close the inner bus; a second call does nothing."""

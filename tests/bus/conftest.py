@@ -21,6 +21,7 @@ from lalliance_agents.bus.link import LinkRules
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.router import free_endpoint, open_router
 from lalliance_agents.bus.shared import SharedBus
+from lalliance_agents.bus.wrapped import WrappedBus
 from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.wire.keys import Keys
@@ -110,22 +111,27 @@ class MemoryTeam:
         return kill
 
 
-class FaultyMemoryBus(FaultyBus):
+class OverMemory(WrappedBus):
+    """Over a memory bus, and tells what that one dropped."""
+
+    _inner: MemoryBus
+
+    @property
+    def dropped_overflow(self) -> int:
+        return self._inner.dropped_overflow
+
+    @property
+    def dropped_oversize(self) -> int:
+        return self._inner.dropped_oversize
+
+
+class FaultyMemoryBus(OverMemory, FaultyBus):
     """A memory bus behind faults: on any pattern they look at what comes, and let it all through."""
 
     def __init__(self, inner: MemoryBus) -> None:
         super().__init__(inner, Keys("m"), "me", MissionClock())
-        self._memory = inner
         self._touchable = ["**"]
         self._links = LinkRules(0, [LinkRule(fault="f", senders=["nobody"], receivers=["me"], cut=True)])
-
-    @property
-    def dropped_overflow(self) -> int:
-        return self._memory.dropped_overflow
-
-    @property
-    def dropped_oversize(self) -> int:
-        return self._memory.dropped_oversize
 
 
 class FaultyTeam(MemoryTeam):
@@ -133,21 +139,12 @@ class FaultyTeam(MemoryTeam):
         return await self._stack.enter_async_context(FaultyMemoryBus(MemoryBus(self._hub)))
 
 
-class SharedMemoryBus(SharedBus):
+class SharedMemoryBus(OverMemory, SharedBus):
     """A memory bus that others could share, with some of what is subscribed to served by wider subscriptions."""
 
     def __init__(self, inner: MemoryBus) -> None:
         super().__init__(inner)
-        self._memory = inner
         self.widen(["m/*", "m/a/*", "m/@chaos/*"])
-
-    @property
-    def dropped_overflow(self) -> int:
-        return self._memory.dropped_overflow
-
-    @property
-    def dropped_oversize(self) -> int:
-        return self._memory.dropped_oversize
 
 
 class SharedTeam(MemoryTeam):

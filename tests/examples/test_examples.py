@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from support.documents import ROOT
 from support.processes import PYTEST_ALONE, Processes, read_until, until
-from support.shown import ROOT, SHOWN, page_with
 
 from lalliance_agents.bus.router import free_endpoint
 
@@ -41,9 +41,3 @@ def test_a_watchman_without_a_world_goes_on_where_another_one_died(processes: Pr
     read_until(spare, "inspecting the fence")
     read_until(spare, "inspecting the gate")
     until(lambda: {path.name for path in stamps.iterdir()} == {"gate", "fence"})
-
-
-@pytest.mark.parametrize("page", SHOWN)
-def test_pages_show_the_files_as_they_are(page: str) -> None:
-    """`python tests/support/shown.py` renews them."""
-    assert page_with(page, SHOWN[page]) == (ROOT / page).read_text()

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from support.documents import ROOT
 
 from lalliance_agents.faults import Fault, LinkFault, Partition
 from lalliance_study.detection.tables import reactions
 
-ROOT = Path(__file__).parents[1]
 DOCS = sorted((ROOT / "docs").glob("*.md"))
 
 
