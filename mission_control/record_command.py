@@ -236,7 +236,7 @@ def convert(
     path: Recorded,
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The new file.", show_default=False)],
 ) -> None:
-    """Write a recording as JSON with schemas, which Foxglove and Lichtblick open."""
+    """Write a recording as JSON with schemas, for viewers such as Foxglove."""
     check_extra()
     from mission_control.recording.convert import convert as carry_out
 
