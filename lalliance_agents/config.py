@@ -7,8 +7,7 @@ makes of its own options is checked by the environment.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
-from difflib import get_close_matches
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
 from typing import Annotated, Any, Literal, Self
@@ -20,6 +19,7 @@ from lalliance_agents.errors import exact
 from lalliance_agents.fault_checks import contradiction, ends_work, misfit
 from lalliance_agents.faults import AnyFault, Fault, describe, robot_of
 from lalliance_agents.model.parameters import Architecture, Learning, NotNegative, Parameters, Positive, Record
+from lalliance_agents.suggestions import like_or_any
 from lalliance_agents.wire.keys import NAME_PATTERN
 
 _DOTTED = r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*"
@@ -147,7 +147,7 @@ class Mission(Record):
                 if needed not in self.tasks:
                     raise misplaced(
                         ("tasks", name, "after", index),
-                        f"{needed!r} is not a task of this mission{like(needed, self.tasks)}",
+                        f"{needed!r} is not a task of this mission{like_or_any(needed, self.tasks)}",
                     )
                 if needed in task.after[:index]:
                     raise misplaced(("tasks", name, "after", index), f"{needed!r} is listed twice; expected it once")
@@ -165,7 +165,7 @@ class Mission(Record):
                 if task not in self.tasks:
                     raise misplaced(
                         ("robots", name, "tasks", task),
-                        f"{task!r} is not a task of this mission{like(task, self.tasks)}",
+                        f"{task!r} is not a task of this mission{like_or_any(task, self.tasks)}",
                     )
         for task in self.tasks:
             if not self.able(task):
@@ -212,7 +212,7 @@ class Mission(Record):
                 if task not in self.tasks:
                     raise misplaced(
                         (*self._where(name, "by_hand_tasks"), task),
-                        f"{task!r} is not a task of this mission{like(task, self.tasks)}",
+                        f"{task!r} is not a task of this mission{like_or_any(task, self.tasks)}",
                     )
 
     def _check_faults(self) -> None:
@@ -230,7 +230,7 @@ class Mission(Record):
 
     def misfit(self, fault: Fault) -> tuple[tuple[str | int, ...], str] | None:
         """What of a fault does not fit this mission, and where in the fault; None if it fits."""
-        wrong = misfit(fault, self.robots, lambda robot: self.robots[robot].tasks, like)
+        wrong = misfit(fault, self.robots, lambda robot: self.robots[robot].tasks)
         robot = robot_of(fault)
         if wrong is None and robot is not None and fault.at < (joins := self.robots[robot].joins):
             sentence = (
@@ -332,9 +332,3 @@ class Mission(Record):
         """The fault from which on `robot` does not work on `task` any more, if there is one."""
         ending = [fault for fault in self.faults if robot_of(fault) == robot and ends_work(fault, task)]
         return min(ending, key=lambda fault: fault.at, default=None)
-
-
-def like(word: str, known: Iterable[str]) -> str:
-    """`; did you mean …?` if one of `known` is spelled much like `word`, else nothing."""
-    close = get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"; did you mean {close[0]!r}?" if close else ""

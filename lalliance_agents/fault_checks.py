@@ -22,35 +22,30 @@ from lalliance_agents.faults import (
     kind_of,
     robot_of,
 )
+from lalliance_agents.suggestions import like_or_any
 
 Place = tuple[str | int, ...]
 """Fields and indices below a fault."""
 
 
-def misfit(
-    fault: Fault,
-    robots: Iterable[str],
-    tasks_of: Callable[[str], Iterable[str]],
-    like: Callable[[str, Iterable[str]], str],
-) -> tuple[Place, str] | None:
+def misfit(fault: Fault, robots: Iterable[str], tasks_of: Callable[[str], Iterable[str]]) -> tuple[Place, str] | None:
     """What of a fault does not fit the team, and where: robots that are not there, globs that match nobody, empty links.
 
     Args:
         fault: the fault.
         robots: the team.
         tasks_of: the tasks that a robot can do.
-        like: makes a suggestion for a name that is not known.
     """
     team = list(robots)
     robot = robot_of(fault)
     if robot is not None and robot not in team:
-        return ("robot",), f"{robot!r} is not a robot of this mission{like(robot, team)}"
+        return ("robot",), f"{robot!r} is not a robot of this mission{like_or_any(robot, team)}"
     if isinstance(fault, Stuck) and fault.task is not None and fault.task not in (known := list(tasks_of(fault.robot))):
-        return ("task",), f"{fault.task!r} is not a task of robot {fault.robot}{like(fault.task, known)}"
+        return ("task",), f"{fault.task!r} is not a task of robot {fault.robot}{like_or_any(fault.task, known)}"
     for place, globs in _globs_of(fault):
         for glob in globs:
             if not any(fnmatchcase(name, glob) for name in team):
-                return place, f"{glob!r} matches no robot of this mission{like(glob, team)}"
+                return place, f"{glob!r} matches no robot of this mission{like_or_any(glob, team)}"
     if isinstance(fault, Partition):
         return _in_two_groups(fault, team)
     if isinstance(fault, LinkFault):

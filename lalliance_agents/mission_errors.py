@@ -14,9 +14,10 @@ from typing import Any, NamedTuple, get_args, get_origin
 from pydantic import BaseModel, Tag
 from pydantic_core import ErrorDetails
 
-from lalliance_agents.config import ENVIRONMENT_PATTERN, FACTORY_PATTERN, like
+from lalliance_agents.config import ENVIRONMENT_PATTERN, FACTORY_PATTERN
 from lalliance_agents.faults import GLOB_PATTERN, LinkFault, Partition
 from lalliance_agents.model.parameters import Parameters
+from lalliance_agents.suggestions import like
 from lalliance_agents.wire.keys import NAME_PATTERN
 
 Place = tuple[str | int, ...]

@@ -10,7 +10,6 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from lalliance_agents.config import like
 from lalliance_agents.fault_checks import contradiction, misfit
 from lalliance_agents.faults import AnyFault, Fault, robot_of
 
@@ -67,7 +66,7 @@ def _spared(chance: random.Random, robots: Document) -> dict[str, str]:
 
 def _fits(fault: Fault, earlier: list[Fault], robots: Document) -> bool:
     robot = robot_of(fault)
-    if misfit(fault, robots, lambda name: robots[name]["tasks"], like) is not None:
+    if misfit(fault, robots, lambda name: robots[name]["tasks"]) is not None:
         return False
     if robot is not None and fault.at < robots[robot].get("joins", 0.0):
         return False

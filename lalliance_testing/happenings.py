@@ -7,9 +7,10 @@ which of them a test waits for.
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 
-from lalliance_agents.config import Mission, like
+from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
 from lalliance_agents.model.events import Cause
+from lalliance_agents.suggestions import like_or_any
 from mission_control.watch.happened import KINDS, Happened
 from world_server.world import Stage
 
@@ -66,5 +67,4 @@ class Wanted:
 
 def _check(word: str | None, known: Mapping[str, object] | list[str] | set[str], what: str) -> None:
     if word is not None and word not in known:
-        hint = like(word, known) or f"; expected one of {', '.join(sorted(known))}"
-        raise UserError(f"{word!r} is not {what}{hint}")
+        raise UserError(f"{word!r} is not {what}{like_or_any(word, sorted(known))}")

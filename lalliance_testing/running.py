@@ -8,11 +8,12 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
-from lalliance_agents.config import Mission, like
+from lalliance_agents.config import Mission
 from lalliance_agents.errors import LallianceError, UserError
 from lalliance_agents.fault_checks import misfit
 from lalliance_agents.faults import describe, kind_of
 from lalliance_agents.mission_file import read_fault
+from lalliance_agents.suggestions import like_or_any
 from lalliance_testing.blame import ExpectationError, blames_its_caller
 from lalliance_testing.engine import Engine
 from lalliance_testing.happenings import Wanted
@@ -60,7 +61,7 @@ class RunningMission:
         names = [f"{number}-{kind_of(fault)}" for number, fault in enumerate(self.mission.faults, 1)]
         for fault in faults:
             if fault not in names and fault not in map(describe, self.mission.faults):
-                raise UserError(f"may_not_fire: {fault!r} is no fault of this mission{like(fault, names)}")
+                raise UserError(f"may_not_fire: {fault!r} is no fault of this mission{like_or_any(fault, names)}")
             self._excused.add(fault)
 
     def start(self) -> None:
@@ -128,7 +129,7 @@ class RunningMission:
         except (TypeError, ValueError) as error:
             raise UserError(f"the fault is not plain data ({error}); expected the fields of a mission file") from None
         fault = read_fault(spelled)
-        wrong = misfit(fault, self.mission.robots, lambda robot: self.mission.robots[robot].tasks, like)
+        wrong = misfit(fault, self.mission.robots, lambda robot: self.mission.robots[robot].tasks)
         if wrong is not None:
             raise UserError(f"{'.'.join(map(str, wrong[0]))}: {wrong[1]}")
         name = self._engine.inject(fault, spelled, lasts)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any
 
-from lalliance_agents.config import Mission, like
+from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
 from lalliance_agents.fault_checks import misfit
 from lalliance_agents.mission_errors import one_line, short
@@ -123,7 +123,7 @@ def _checked(content: dict[str, Any], mission: Mission) -> str:
     text = json.dumps(content)
     fault = read_fault(text)
     # Whether a robot that joins late is there by now, and what else is in force, only the world knows.
-    wrong = misfit(fault, mission.robots, lambda robot: mission.robots[robot].tasks, like)
+    wrong = misfit(fault, mission.robots, lambda robot: mission.robots[robot].tasks)
     if wrong is not None:
         raise UserError(f"{'.'.join(map(str, wrong[0]))}: {wrong[1]}")
     if len(text) > LONGEST_FAULT:

@@ -7,6 +7,7 @@ from pathlib import Path
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
 from lalliance_agents.faults import Crash, Hang, describe, fits
+from lalliance_agents.suggestions import like_or_any
 
 #: Names that a sentence lists before it only counts.
 FEW = 4
@@ -20,7 +21,7 @@ def named(path: Path, mission: Mission, words: Sequence[str]) -> list[str]:
     """
     for word in words:
         if not any(fits(robot, [word]) for robot in mission.robots):
-            raise UserError(f"{path}: no robot {word!r} in this mission; expected one of {', '.join(mission.robots)}")
+            raise UserError(f"{path}: no robot {word!r} in this mission{like_or_any(word, mission.robots)}")
     return [robot for robot in mission.robots if fits(robot, words)]
 
 

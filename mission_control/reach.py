@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from lalliance_agents.bus.base import Bus
 from lalliance_agents.bus.zenoh_bus import ZenohBus, open_bus
-from lalliance_agents.config import like
 from lalliance_agents.errors import BusError, UserError
+from lalliance_agents.suggestions import like
 from lalliance_agents.wire.keys import NAME_PATTERN, OPERATOR, Keys, Kind
 from mission_control.running import endpoints, running
 from mission_control.shell import credentials_from, endpoint_of

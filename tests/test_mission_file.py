@@ -149,7 +149,7 @@ REPLACED = {
     ("depot", "x" * 65): f"1: name: '{'x' * 55} ... is not a name; expected 1 to 64 of A-Z a-z 0-9 _ -",
     ("{a: {}, b: {after: [a]}}", "[a, b]"): "2: tasks: ['a', 'b'] is a list; expected a mapping, as in {a: ...}",
     ("[a]", "a"): "2: tasks.b.after: 'a' is text; expected a list, as in [a]",
-    ("[a]", "[c]"): "2: tasks.b.after.0: 'c' is not a task of this mission",
+    ("[a]", "[c]"): "2: tasks.b.after.0: 'c' is not a task of this mission; expected one of a, b",
     ("[a]", "[a, a]"): "2: tasks.b.after.1: 'a' is listed twice; expected it once",
     ("[a]", "[b]"): "2: tasks.b.after: the prerequisites form a circle: b after b",
     ("{a: {},", "{a: {after: [b]},"): "2: tasks.a.after: the prerequisites form a circle: a after b after a",
@@ -265,7 +265,7 @@ ADDED = {
     "faults: [{kind: slow, robot: r1, at: 3, factor: 0.5}]": "faults.0.factor: 0.5 is not allowed; expected a number greater "
     "than 1",
     "faults: [{kind: slow, robot: r1, at: 3}]": "faults.0: a field is missing; expected a field 'factor'",
-    "faults: [{kind: stuck, robot: r2, at: 3, task: a}]": "faults.0.task: 'a' is not a task of robot r2",
+    "faults: [{kind: stuck, robot: r2, at: 3, task: a}]": "faults.0.task: 'a' is not a task of robot r2; expected one of b",
     "faults: [{robot: r1, at: 3}]": "faults.0: a field is missing; expected a field 'kind'",
     "faults: [{at: -3, link: {}, loss: 0.5}]": "faults.0.at: -3 is not allowed; expected a number of at least 0",
     "faults: [{at: 3, link: {}, loss: 1.5}]": "faults.0.loss: 1.5 is not allowed; expected a number of at most 1",
@@ -276,7 +276,8 @@ ADDED = {
     "faults: [{at: 3, link: {form: r1}, loss: 0.5}]": "faults.0.link.form: unknown field; did you mean 'from'?",
     "faults: [{at: 3, link: {from: r1}}]": "faults.0: the rule does nothing; expected loss, delay, duplicate, reorder or "
     "cut: true",
-    "faults: [{at: 3, link: {from: r3}, loss: 0.5}]": "faults.0.link.from: 'r3' matches no robot of this mission",
+    "faults: [{at: 3, link: {from: r3}, loss: 0.5}]": "faults.0.link.from: 'r3' matches no robot of this "
+    "mission; expected one of r1, r2",
     "faults: [{at: 3, link: {from: r/2}, loss: 0.5}]": "faults.0.link.from: 'r/2' is no name and no glob; expected 1 to 64 "
     "of A-Z a-z 0-9 _ - * ?",
     "faults: [{at: 3, link: {}, delay: {uniform: [2, 1]}}]": "faults.0.delay.uniform: the second number 1 s is below the "

@@ -1,8 +1,8 @@
 """Which keys somebody wants to look at, as written on the command line. Pure."""
 
 from lalliance_agents.bus.patterns import check_pattern, intersects
-from lalliance_agents.config import like
 from lalliance_agents.errors import UserError
+from lalliance_agents.suggestions import like
 from lalliance_agents.wire.keys import ROOT, Keys, Kind
 
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from lalliance_agents.config import like
 from lalliance_agents.errors import UserError
+from lalliance_agents.suggestions import like_or_any
 from mission_control.watch.happened import Happened
 from mission_control.watch.story import Story
 
@@ -60,8 +60,7 @@ class Window:
 def _check(what: str, name: str | None, known: Iterable[str], mission: str) -> None:
     names = sorted(known)
     if name is not None and name not in names:
-        hint = like(name, names) or (f"; expected one of {', '.join(names)}" if names else "")
-        raise UserError(f"mission {mission} has no {what} {name[:80]!r}{hint}")
+        raise UserError(f"mission {mission} has no {what} {name[:80]!r}{like_or_any(name, names)}")
 
 
 def instant(text: str) -> float:

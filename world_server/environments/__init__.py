@@ -8,8 +8,9 @@ messages, failures or clocks are known here. This file finds the class that a mi
 from importlib import import_module
 from inspect import isabstract
 
-from lalliance_agents.config import Mission, like
+from lalliance_agents.config import Mission
 from lalliance_agents.errors import MissionError
+from lalliance_agents.suggestions import like
 from world_server.environments.base import Environment
 from world_server.environments.box_pushing import BoxPushing
 from world_server.environments.task_pool import TaskPool
