@@ -228,9 +228,11 @@ class Launcher:
             clock=self._clock,
             say=self._view.say,
         )
-        async with recorded:
-            yield
-        self._view.say(told(self._writer))
+        try:
+            async with recorded:
+                yield
+        finally:
+            self._view.say(told(self._writer))
 
     async def _conduct(self, bus: Bus) -> dict[str, Any]:
         messenger = await self._watch(bus)

@@ -2,6 +2,8 @@
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
 from types import TracebackType
 from typing import Self
 
@@ -12,6 +14,7 @@ from rich.text import Text
 
 from lalliance_agents.config import Mission
 from lalliance_agents.wire.messages import Message
+from mission_control.watch.screen import show, stoppable
 from mission_control.watch.story import Story
 from mission_control.watch.words import printable
 
@@ -88,15 +91,18 @@ class LiveView(Lines):
         self._endpoint = ""
         self._pinned = ""
         self._live = Live(console=console, get_renderable=self._render, refresh_per_second=5, screen=True)
+        self._shown = ExitStack()
 
     def __enter__(self) -> Self:
-        self._live.__enter__()
+        """Show it; only in an event loop."""
+        self._shown.enter_context(self._live)
+        self._shown.enter_context(stoppable(partial(show, self._live)))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._live.__exit__(kind, error, trace)
+        self._shown.close()
         for line in self._said:
             super().say(line)
 

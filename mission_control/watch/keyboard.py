@@ -1,17 +1,14 @@
-"""Single keys pressed on the terminal, by name.
-
-Who stops this process with Ctrl-Z gets the terminal as it was, and gives it back as this process had it.
-"""
+"""Single keys pressed on the terminal, by name."""
 
 import asyncio
 import contextlib
 import os
-import signal
 import sys
 import termios
 import tty
 from collections.abc import Callable, Iterator
-from typing import Any
+
+from mission_control.watch.screen import stoppable
 
 _NAMES = {
     b"\x1b[A": "up",
@@ -85,9 +82,18 @@ def _unbuffered(descriptor: int, show: Callable[[bool], None]) -> Iterator[bool]
         yield False
         return
     before = termios.tcgetattr(descriptor)
+
+    def take(taken: bool) -> None:
+        if taken:
+            with contextlib.suppress(termios.error):  # the terminal is gone
+                tty.setcbreak(descriptor)  # in the background, here it stands still again
+        else:
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        show(taken)
+
     tty.setcbreak(descriptor)
     try:
-        with _stoppable(descriptor, before, show):
+        with stoppable(take):
             yield True
     finally:
         if not _is_in_background(descriptor):
@@ -99,33 +105,3 @@ def _is_in_background(descriptor: int) -> bool:
     with contextlib.suppress(OSError):  # a terminal of another session, which nobody here is in the background of
         return os.tcgetpgrp(descriptor) != os.getpgrp()
     return False
-
-
-@contextlib.contextmanager
-def _stoppable(descriptor: int, before: list[Any], show: Callable[[bool], None]) -> Iterator[None]:
-    """Give the terminal back as it was `before` when it stops this process, and take it again afterwards."""
-    loop = asyncio.get_running_loop()
-
-    def go_on() -> None:
-        with contextlib.suppress(termios.error):  # the terminal is gone
-            tty.setcbreak(descriptor)  # in the background, here it stands still again
-        show(True)
-
-    def stop() -> None:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
-        show(False)
-        loop.remove_signal_handler(signal.SIGTSTP)
-        os.kill(os.getpid(), signal.SIGTSTP)  # here it stands still, unless nobody could have it go on
-        loop.add_signal_handler(signal.SIGTSTP, stop)
-        go_on()
-
-    if signal.getsignal(signal.SIGTSTP) is not signal.SIG_DFL:  # it is not to be stopped
-        yield
-        return
-    loop.add_signal_handler(signal.SIGTSTP, stop)
-    loop.add_signal_handler(signal.SIGCONT, go_on)
-    try:
-        yield
-    finally:
-        loop.remove_signal_handler(signal.SIGTSTP)
-        loop.remove_signal_handler(signal.SIGCONT)

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+from functools import partial
 from pathlib import Path
 
 import typer
@@ -19,6 +20,7 @@ from mission_control.watch.board import ORDERS, Row, Selection, rows
 from mission_control.watch.explain import tell
 from mission_control.watch.keyboard import keyboard
 from mission_control.watch.onlooker import Onlooker, look, meet
+from mission_control.watch.screen import show
 from mission_control.watch.story import Story
 from mission_control.watch.words import printable
 
@@ -78,7 +80,7 @@ async def _go_on(view: "View", onlooker: Onlooker, story: Story) -> None:
     try:
         with (
             Live(console=view.console, get_renderable=view.screen, auto_refresh=False, screen=True) as live,
-            keyboard(press, lambda shown: _show(live, shown)),
+            keyboard(press, partial(show, live)),
         ):
             while not seen_enough.is_set():
                 pressed.clear()
@@ -90,12 +92,6 @@ async def _go_on(view: "View", onlooker: Onlooker, story: Story) -> None:
         following.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await following
-
-
-def _show(live: Live, shown: bool) -> None:
-    """Take the screen, or give it back to who has the terminal meanwhile."""
-    live.console.set_alt_screen(shown)
-    live.console.show_cursor(not shown)
 
 
 class View:

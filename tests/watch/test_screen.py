@@ -2,15 +2,18 @@
 
 import asyncio
 import io
+import os
+import signal
 
 import pytest
 from rich.console import Console
 
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.clock import MissionClock
+from lalliance_agents.mission_file import parse_mission
 from lalliance_agents.wire.keys import WORLD, Keys, Kind
 from lalliance_agents.wire.messages import Event, Status, encode
-from mission_control.live import can_redraw
+from mission_control.live import LiveView, can_redraw
 from mission_control.reach import Reached
 from mission_control.watch.onlooker import Onlooker
 from mission_control.watch.sighting import Sighting
@@ -87,6 +90,35 @@ async def test_who_follows_hears_what_happens_until_the_mission_is_over() -> Non
             world.put(said.key, said.payload, ["state", "telemetry"][number % 2])  # type: ignore[arg-type]
         told = [one.text async for one in further(onlooker, Story("m"))]
     assert told == ["one", "two"]
+
+
+async def test_who_stops_a_run_has_the_terminal_until_it_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    console = Console(file=io.StringIO(), width=80, height=24, force_terminal=True)
+    mission = parse_mission("name: m\ntasks: {a: {}}\nrobots: {one: {tasks: {a: 3}}}", "m.yaml")
+    over, before = asyncio.Event(), signal.getsignal(signal.SIGTSTP)
+    told: list[str] = []
+
+    def shown() -> str:
+        text = console.file.getvalue()  # type: ignore[attr-defined]
+        console.file = io.StringIO()
+        return text
+
+    def kill(process: int, number: int) -> None:
+        assert (process, number) == (os.getpid(), signal.SIGTSTP)
+        told.append(shown())
+        over.set()
+
+    monkeypatch.setattr(os, "kill", kill)
+    with LiveView(mission, console):
+        shown()
+        signal.raise_signal(signal.SIGTSTP)
+        async with asyncio.timeout(10):
+            await over.wait()
+        given_back, taken = told[0], shown()
+    assert given_back.endswith("\x1b[?25h\x1b[?1049l")
+    assert "\x1b[?1049h" in taken
+    assert "\x1b[?25l" in taken
+    assert signal.getsignal(signal.SIGTSTP) is before
 
 
 @pytest.mark.parametrize(("term", "can"), [("xterm", True), ("dumb", False), ("unknown", False)])

@@ -1,0 +1,47 @@
+"""The whole terminal, taken and given back.
+
+Who stops this process with Ctrl-Z gets the terminal as it was, and gives it back as this process had it.
+"""
+
+import asyncio
+import contextlib
+import os
+import signal
+from collections.abc import Callable, Iterator
+
+from rich.live import Live
+
+
+def show(live: Live, shown: bool) -> None:
+    """Take the screen, or give it back to who has the terminal meanwhile."""
+    if shown:
+        live.start(refresh=True)
+    else:
+        live.stop()
+
+
+@contextlib.contextmanager
+def stoppable(take: Callable[[bool], None]) -> Iterator[None]:
+    """Have `take` called with False before this process is stopped from the terminal, and with True when it goes on.
+
+    Only in an event loop.
+    """
+    loop = asyncio.get_running_loop()
+
+    def stop() -> None:
+        take(False)
+        loop.remove_signal_handler(signal.SIGTSTP)
+        os.kill(os.getpid(), signal.SIGTSTP)  # here it stands still, unless nobody could have it go on
+        loop.add_signal_handler(signal.SIGTSTP, stop)
+        take(True)
+
+    if signal.getsignal(signal.SIGTSTP) is not signal.SIG_DFL:  # it is not to be stopped
+        yield
+        return
+    loop.add_signal_handler(signal.SIGTSTP, stop)
+    loop.add_signal_handler(signal.SIGCONT, take, True)
+    try:
+        yield
+    finally:
+        loop.remove_signal_handler(signal.SIGTSTP)
+        loop.remove_signal_handler(signal.SIGCONT)
