@@ -18,12 +18,12 @@ from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import UserError
 from lalliance_agents.faults import Fault
-from lalliance_agents.wire.messages import Message
 from mission_control.chaos_client import ask
 from mission_control.keeper import LaunchError
 from mission_control.launch import Launcher, Plan
 from mission_control.temporary import own_folder
 from mission_control.watch.happened import Happened
+from mission_control.watch.sighting import Sighting
 from mission_control.watch.story import Story
 from mission_control.watch.words import printable
 from world_server.world import TRIAL_PAUSE
@@ -51,10 +51,10 @@ class Recorder:
         self._story = Story(mission)
         self._now = 0.0
 
-    def take(self, message: Message, now: float) -> None:
-        """A message of the mission came at `now`."""
-        self._now = now
-        happened = self._story.hear(message, now)
+    def take(self, sighting: Sighting) -> None:
+        """Something of the mission was seen on the bus."""
+        self._now = sighting.now
+        happened = self._story.take(sighting)
         if happened is not None:
             self._note(happened)
 

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from lalliance_agents.errors import LallianceError, UserError
-from lalliance_agents.wire.messages import Message, Status
+from lalliance_agents.wire.messages import Status
 from mission_control.processes import Child, OnLine
+from mission_control.watch.sighting import Sighting
 
 #: How often a world server that dies is started again, while the mission does not get on.
 RESTARTS = 20
@@ -24,8 +25,8 @@ _BY_ITSELF = frozenset({0, 1, 2})
 class View(Protocol):
     """Where a launcher shows what happens."""
 
-    def take(self, message: Message, now: float) -> None:
-        """A message of the mission came at `now`."""
+    def take(self, sighting: Sighting) -> None:
+        """Something of the mission was seen on the bus."""
 
     def locate(self, mission: str, endpoint: str) -> None:
         """The mission's bus is there."""

@@ -20,14 +20,15 @@ from lalliance_agents.bus.router import free_endpoint
 from lalliance_agents.bus.zenoh_bus import open_bus
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
-from lalliance_agents.errors import BusError, UserError
-from lalliance_agents.wire.keys import LAUNCHER, OPERATOR, WORLD, Key, Keys, Kind
+from lalliance_agents.errors import BusError, MessageError, UserError
+from lalliance_agents.wire.keys import LAUNCHER, OPERATOR, Key, Keys, Kind
 from lalliance_agents.wire.messages import Event, Message, Status
 from mission_control.hosting import shares
 from mission_control.keeper import Keeper, LaunchError, View
 from mission_control.orders import Orders
 from mission_control.processes import GRACE, Child
 from mission_control.running import announced
+from mission_control.watch.onlooker import Onlooker
 from world_server.history import recall
 from world_server.world import Stage, World
 
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from mission_control.dashboard.beside import Page
     from mission_control.recording.writer import RecordingWriter
 
+#: What is shown of a mission.
+SHOWN = (Kind.EVENT, Kind.STATUS, Kind.DECISION, Kind.MOTIVATION, Kind.CHAOS_RULES)
 #: How long the router may take to listen, in seconds.
 ROUTER_TIMEOUT = 8.0
 #: How long the world server may take to end after the last robot did, in seconds.
@@ -165,6 +168,7 @@ class Launcher:
         self._view = view
         self._writer = writer
         self._page = page
+        self._keys = Keys(plan.mission.name)
         self._clock = MissionClock(plan.speed)
         self._endpoint = plan.endpoint()
         self._router: Child | None = None
@@ -236,30 +240,42 @@ class Launcher:
 
     async def _conduct(self, bus: Bus) -> dict[str, Any]:
         messenger = await self._watch(bus)
-        await self._world.start()
-        await asyncio.gather(*map(self._start_robots, shares(self._plan.beginning.first, self._plan.processes)))
-        summary = await self._await_end()
-        await self._await_robots()
+        async with self._shown(bus):
+            await self._world.start()
+            await asyncio.gather(*map(self._start_robots, shares(self._plan.beginning.first, self._plan.processes)))
+            summary = await self._await_end()
+            await self._await_robots()
         await messenger.close()
         return summary
 
+    @contextlib.asynccontextmanager
+    async def _shown(self, bus: Bus) -> AsyncIterator[None]:
+        """Have the view show what happens, also what was not heard while the router was away, until it is up to date."""
+        onlooker = Onlooker(bus, self._plan.mission.name, self._clock, motivations=True, kinds=SHOWN)
+        async with contextlib.AsyncExitStack() as last, onlooker:
+            last.push_async_callback(asyncio.gather, asyncio.create_task(self._show(onlooker)))
+            yield
+
+    async def _show(self, onlooker: Onlooker) -> None:
+        async for sighting in onlooker:
+            with contextlib.suppress(MessageError):  # a key that somebody made up
+                if self._keys.parse(sighting.key).robot in {None, *self._plan.mission.robots}:
+                    self._view.take(sighting)
+
     async def _watch(self, bus: Bus) -> Messenger:
-        keys = Keys(self._plan.mission.name)
+        keys = self._keys
         messenger = self._messenger = Messenger(bus, keys, LAUNCHER, 1, self._clock.now)
-        for kind in (Kind.EVENT, Kind.STATUS, Kind.DECISION, Kind.MOTIVATION):
+        for kind in (Kind.EVENT, Kind.STATUS):
             await messenger.listen(keys.build(kind), self._take)
         if not self._plan.processes:
             await bus.announce_presence(keys.build(Kind.LAUNCHER))
         return messenger
 
     def _take(self, _: Key, message: Message) -> None:
-        if message.sender != WORLD and message.sender not in self._plan.mission.robots:
-            return
         if isinstance(message, Event) and message.kind == "order":
             self._orders.take(message)
         elif isinstance(message, Status):
             self._world.heard(message)
-        self._view.take(message, self._clock.now())
 
     def _restart(self, robot: str) -> None:
         self._spawn(self._start_robots([robot]))

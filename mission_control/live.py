@@ -13,8 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from lalliance_agents.config import Mission
-from lalliance_agents.wire.messages import Message
 from mission_control.watch.screen import show, stoppable
+from mission_control.watch.sighting import Sighting
 from mission_control.watch.story import Story
 from mission_control.watch.words import printable
 
@@ -52,9 +52,9 @@ class Lines:
     ) -> None:
         pass
 
-    def take(self, message: Message, now: float) -> None:
-        """Show a message of the mission that came at `now`."""
-        happened = self._story.hear(message, now)
+    def take(self, sighting: Sighting) -> None:
+        """Show what was seen of the mission."""
+        happened = self._story.take(sighting)
         if happened is not None:
             self.say(str(happened))
 
@@ -106,9 +106,9 @@ class LiveView(Lines):
         for line in self._said:
             super().say(line)
 
-    def take(self, message: Message, now: float) -> None:
+    def take(self, sighting: Sighting) -> None:
         """Go on with the story; it shows at the next redraw."""
-        super().take(message, now)
+        super().take(sighting)
 
     def locate(self, mission: str, endpoint: str) -> None:
         """Show where the mission's bus is, for as long as the view lasts."""

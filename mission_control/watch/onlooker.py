@@ -14,7 +14,7 @@ import asyncio
 import contextlib
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from types import TracebackType
 from typing import Self
 
@@ -59,6 +59,7 @@ class Onlooker:
         motivations: whether to listen to motivations too; robots publish them only while somebody does.
         capacity: sightings that may wait to be fetched.
         only: a pattern of keys: nothing else is looked at, and of what there was before only last values are asked for.
+        kinds: nothing else is looked at; the rules in force have to be among them, as the world is known by its answer.
         asks: whether to ask for what there was before, or was said in a gap.
         notice: called with each gap, once it is over and what could be recovered is among the sightings.
 
@@ -75,6 +76,7 @@ class Onlooker:
         motivations: bool,
         capacity: int = CAPACITY,
         only: str | None = None,
+        kinds: Collection[Kind] | None = None,
         asks: bool = True,
         notice: Callable[[Gap], None] = lambda _: None,
     ) -> None:
@@ -87,6 +89,7 @@ class Onlooker:
         self._clock = clock
         self._motivations = motivations
         self._only = only
+        self._kinds = kinds
         self._retained = () if not asks else LAST_VALUES if only is not None else (*LAST_VALUES, *HISTORY)
         self._notice = notice
         self._waiting = Waiting(capacity, self._is_presence)
@@ -189,6 +192,8 @@ class Onlooker:
         return await self._bus.subscribe(self._keys.build(Kind.MOTIVATION, robot=robot), self._see)
 
     def _is_wanted(self, kind: Kind) -> bool:
+        if self._kinds is not None and kind not in self._kinds:
+            return False
         return self._only is None or intersects(self._only, self._keys.build(kind))
 
     def _holds(self, key: str) -> bool:
@@ -197,6 +202,8 @@ class Onlooker:
     def _patterns(self) -> list[str]:
         if self._only is not None:
             return [self._only]
+        if self._kinds is not None:
+            return [self._keys.build(kind) for kind in self._kinds]
         if self._motivations:
             return [f"{ROOT}/{self._mission}/**", *map(self._keys.build, _HIDDEN)]
         return [self._keys.build(kind) for kind in BODY_OF if kind not in _UNHEARD | {Kind.MOTIVATION}]
