@@ -3,7 +3,7 @@
     python benchmarks/bare.py ENDPOINT PARENT [NAME [MATE …]]
 
 It makes a step ten times a second. With a name it publishes three keys, one of them 5 times a second and two once, and hears
-those of its mates that a robot hears: the first and the last. What comes is handed from Zenoh's threads to the event loop.
+those of its mates that a robot hears: the first and the last. What Zenoh's threads bring waits for the next step.
 `team_size.py` starts it.
 """
 
@@ -23,19 +23,18 @@ SIZE = 150
 
 
 class Ear:
-    """Takes messages from Zenoh's threads into the loop."""
+    """Keeps what Zenoh's threads bring until the next step."""
 
     def __init__(self) -> None:
         self.heard = 0
         self._waiting: deque[zenoh.Sample] = deque()
-        self._loop = asyncio.get_running_loop()
 
     def __call__(self, sample: zenoh.Sample) -> None:
         """Called by Zenoh."""
         self._waiting.append(sample)
-        self._loop.call_soon_threadsafe(self._drain)
 
-    def _drain(self) -> None:
+    def collect(self) -> None:
+        """Read what came."""
         while self._waiting:
             self._waiting.popleft().payload.to_bytes()
             self.heard += 1
@@ -45,9 +44,12 @@ async def live(endpoint: str, names: list[str]) -> None:
     """Send and hear until killed."""
     drop = zenoh.CongestionControl.DROP
     with zenoh.open(zenoh.Config.from_json5(json.dumps(client_settings(endpoint, 5.0)))) as session:
-        ear = zenoh.handlers.Callback(Ear(), indirect=False)
+        ear = Ear()
+        callback = zenoh.handlers.Callback(ear, indirect=False)
         heard = [
-            session.declare_subscriber(f"bare/{key}/{mate}", ear) for mate in names[1:] for key in (KEYS[0], KEYS[-1])
+            session.declare_subscriber(f"bare/{key}/{mate}", callback)
+            for mate in names[1:]
+            for key in (KEYS[0], KEYS[-1])
         ]
         ways = [
             session.declare_publisher(f"bare/{key}/{name}", congestion_control=drop)
@@ -59,6 +61,7 @@ async def live(endpoint: str, names: list[str]) -> None:
         payload, step = bytes(SIZE), 0
         while True:
             await asyncio.sleep(0.1)
+            ear.collect()
             step += 1
             for way in ways if step % 10 == 0 else ways[: step % 2 == 0]:
                 way.put(payload)

@@ -24,7 +24,15 @@ class MissionClock:
 
     def now(self) -> float:
         """Mission time, in seconds."""
-        return self._since + (self._loop.time() - self._born) * self._speed
+        return self.at(self._loop.time())
+
+    def at(self, instant: float) -> float:
+        """Mission time at an instant of the event loop's clock, in seconds."""
+        return self._since + (instant - self._born) * self._speed
+
+    def lasts(self, seconds: float) -> float:
+        """How long a length of mission time takes, in real seconds."""
+        return seconds / self._speed
 
     async def sleep_until(self, instant: float) -> None:
         """Wait until mission time `instant`; an instant that has passed still lets other tasks run."""

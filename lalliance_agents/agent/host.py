@@ -71,8 +71,8 @@ class Host:
         heard = {mate for member in self._members for mate in self._mission.teammates(member.name)}
         if 2 * len(heard) >= len(self._mission.robots):
             keys = Keys(self._mission.name)
-            kinds = Kind.ACTIVITY, Kind.HEARTBEAT, Kind.SENSE_TASK, Kind.SENSE_ROBOT
-            self._bus.widen(keys.build(kind) for kind in kinds)
+            self._bus.widen(map(keys.build, (Kind.ACTIVITY, Kind.HEARTBEAT)), lazy=True)
+            self._bus.widen(map(keys.build, (Kind.SENSE_TASK, Kind.SENSE_ROBOT)))
 
 
 async def _all_or_none(tasks: Iterable[asyncio.Task[Outcome]]) -> list[Outcome]:

@@ -1,7 +1,8 @@
 """The robot at run time: receive, feed, tick, perform.
 
 A `Robot` puts a mind, a messenger and a body together in one event loop. Messages become events; once per control period
-the mind ticks, or only beats where it has nothing to decide, and its commands go to the radio and the body. Once a second
+the mind ticks, or only beats where it has nothing to decide, and its commands go to the radio and the body. As the mind
+decides in these steps only, what teammates say waits for the next of them, with the instant at which it came. Once a second
 the robot refreshes what others keep of it. It decides nothing itself, and nothing that it receives can end it: it ends when
 the world says that the mission is over, or when it is cancelled. It hears through the faults of links that the world has put
 in force.
@@ -25,8 +26,18 @@ from lalliance_agents.bus.messenger import Messenger, Receiver
 from lalliance_agents.clock import MissionClock
 from lalliance_agents.config import Mission
 from lalliance_agents.errors import MissionError
-from lalliance_agents.model.events import Activate, Announce, BodyFailed, Command, Deactivate, Decision, TrialStarted
+from lalliance_agents.model.events import (
+    Activate,
+    Announce,
+    BodyFailed,
+    Command,
+    Deactivate,
+    Decision,
+    Event,
+    TrialStarted,
+)
 from lalliance_agents.model.parameters import Erratum
+from lalliance_agents.suggestions import like_or_any
 from lalliance_agents.wire.keys import Key, Keys, Kind
 from lalliance_agents.wire.messages import Activity, BodyState, Decoder, Heartbeat, Hello, Message, TaskState, decode_at
 
@@ -80,9 +91,7 @@ class Robot:
         decode: Decoder = decode_at,
     ) -> None:
         if name not in mission.robots:
-            raise MissionError(
-                f"mission {mission.name} has no robot {name!r}; expected one of {', '.join(mission.robots)}"
-            )
+            raise MissionError(f"mission {mission.name} has no robot {name!r}{like_or_any(name, mission.robots)}")
         self.name = name
         self._mission = mission
         self._world = world
@@ -117,6 +126,8 @@ class Robot:
         self._saved_version = self.mind.knowledge.version
         self._saving: asyncio.Task[None] | None = None
         self._refresh_due = self._greeting_due = self._motivation_due = now
+        #: The latest instant of which the mind has been told something.
+        self._told_until = now
         self._over: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
         self._listening: set[asyncio.Task[None]] = set()
 
@@ -149,16 +160,18 @@ class Robot:
             await self._bus.obey(timeout=GREETING_TIMEOUT)
         if not self._hears_elsewhere:
             for task in self._repertoire:
-                await listen(keys.build(Kind.ACTIVITY, task=task), self._receive_presence)
+                await self._messenger.listen_lazily(keys.build(Kind.ACTIVITY, task=task), self._receive_presence)
         for teammate in self._team.abilities:
             await self._listen_to(teammate)
-        await listen(keys.build(Kind.HELLO), self._receive_hello)
+        await self._messenger.listen_lazily(keys.build(Kind.HELLO), self._receive_hello)
         await self._messenger.offer(keys.build(Kind.HELLO, robot=self.name), self._own_hello)
         self._motivations = await self._bus.publication(
             keys.build(Kind.MOTIVATION, robot=self.name), Delivery.TELEMETRY
         )
-        self.mind.handle(roster(self._mission, self.name), self._clock.now())
-        questions: dict[str, Receiver] = {keys.build(Kind.HELLO): self._receive_hello}
+        self._tell(roster(self._mission, self.name))
+        questions: dict[str, Receiver] = {
+            keys.build(Kind.HELLO): lambda key, message: self._receive_hello(key, message, 0.0)
+        }
         if self._world:
             body = keys.build(Kind.SENSE_ROBOT, robot=self.name)
             for task in self._repertoire:
@@ -174,6 +187,7 @@ class Robot:
         )
 
     async def _leave(self, ticking: asyncio.Task[None] | None) -> None:
+        self._bus.collect()
         ending = set(self._listening)
         if ticking is not None:
             ending.add(ticking)
@@ -193,7 +207,16 @@ class Robot:
             await asyncio.wait({self._saving})
         await self._save()
 
-    def _receive_presence(self, _: Key, message: Message) -> None:
+    def _tell(self, event: Event, at: float | None = None) -> None:
+        """Tell the mind of something that was perceived at the instant `at`, or now; what came before, it knows by then."""
+        if at is None:
+            self._bus.collect()
+            at = self._clock.now()
+        # A thread may note that a message has come, and hand it over only after something later was told.
+        self._told_until = max(self._told_until, at)
+        self.mind.handle(event, self._told_until)
+
+    def _receive_presence(self, _: Key, message: Message, came: float) -> None:
         if not isinstance(message, Activity | Heartbeat):
             return
         if not self._team.knows(message.sender):
@@ -202,7 +225,7 @@ class Robot:
             self._messenger.drop("other trial", message.sender)
         else:
             self._reports.heard(message.sender)
-            self.mind.handle(translate.heard(message), self._clock.now())
+            self._tell(translate.heard(message), self._clock.at(came))
 
     def _receive_sense(self, key: Key, message: Message) -> None:
         if isinstance(message, TaskState) and key.task in self._repertoire and message.trial >= self._trial:
@@ -220,7 +243,7 @@ class Robot:
             if message.elapsed is not None and message.trial == self._trial:
                 self._trial_began = self._clock.now() - message.elapsed
 
-    def _receive_hello(self, _: Key, message: Message) -> None:
+    def _receive_hello(self, _: Key, message: Message, __: float) -> None:
         if not isinstance(message, Hello):
             return
         tasks = frozenset(message.tasks)
@@ -233,7 +256,7 @@ class Robot:
             listening.add_done_callback(self._listening.discard)
 
     async def _listen_to(self, teammate: str) -> None:
-        listen = self._messenger.listen
+        listen = self._messenger.listen_lazily
         await listen(self._keys.build(Kind.HEARTBEAT, robot=teammate), self._receive_presence)
         if self._hears_elsewhere:
             await listen(self._keys.build(Kind.ACTIVITY, robot=teammate), self._receive_presence)
@@ -250,7 +273,7 @@ class Robot:
         for one in self._repertoire.values():
             one.sensed = None
             one.returned = False
-        self.mind.handle(TrialStarted(translate.learning(learning)), self._clock.now())
+        self._tell(TrialStarted(translate.learning(learning)))
 
     def _feel(self, one: BehaviorSet) -> None:
         """Ask a behaviour set how its task stands, and tell the mind if that has changed; not before the first trial."""
@@ -265,7 +288,7 @@ class Robot:
             felt = False, False
         if self._told.get(one.task) != felt:
             self._told[one.task] = felt
-            self.mind.handle(translate.sensed(one.task, *felt), self._clock.now())
+            self._tell(translate.sensed(one.task, *felt))
 
     def _is_complete(self, one: BehaviorSet) -> bool:
         """What the set says; and where there is a world, that decides when a task is done."""
@@ -276,7 +299,7 @@ class Robot:
         return says or (one.sensed is not None and one.sensed.complete)
 
     def _body_failed(self, one: BehaviorSet) -> None:
-        self.mind.handle(BodyFailed(one.task), self._clock.now())
+        self._tell(BodyFailed(one.task))
 
     def _body_returned(self, one: BehaviorSet) -> None:
         self._feel(one)
@@ -286,7 +309,8 @@ class Robot:
         due = self._clock.now() + self._chance.random() * period
         while True:
             await self._clock.sleep_until(due)
-            now = self._clock.now()
+            self._bus.collect()
+            now = self._told_until = max(self._clock.now(), self._told_until)
             missed = max(int((now - due) / period), 0)
             self._reports.ticked(missed)
             self._tick(now)

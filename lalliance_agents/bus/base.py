@@ -2,10 +2,11 @@
 
 Every handler is called in the event loop of the task that registered it, one sample at a time, in the order in which a
 publisher sent (what was sent with different `Delivery` may overtake); never from another thread, never inside `put`. A
-participant hears itself. A handler must not block; what it raises is logged and counts as its own failure, never the
-bus's. Delivery is best effort on every bus: what is published while the bus is down is lost, without an error, and a
-flood drops the oldest samples first. Patterns are key expressions: `*` is one chunk, `**` any number of chunks, and a
-chunk that starts with `@` is matched by neither.
+participant hears itself. To wake the loop for each message is most of what it costs; who looks at what came in regular
+steps anyway subscribes lazily, and collects. A handler must not block; what it raises is logged and counts as its own
+failure, never the bus's. Delivery is best effort on every bus: what is published while the bus is down is lost, without an
+error, and a flood drops the oldest samples first. Patterns are key expressions: `*` is one chunk, `**` any number of
+chunks, and a chunk that starts with `@` is matched by neither.
 
 A key or pattern that is not one, or is too long, raises `ValueError` wherever it is given. After `close`, what is
 published is ignored and queries have no answers, while a new declaration is a mistake: `RuntimeError`.
@@ -37,6 +38,8 @@ class Delivery(StrEnum):
 
 
 Handler = Callable[[Sample], None]
+#: Is handed a sample, and when it came, in seconds of the event loop's clock.
+LazyHandler = Callable[[Sample, float], None]
 Answer = Callable[[Sample], list[Sample]]
 PresenceHandler = Callable[[str, bool], None]
 ConnectionHandler = Callable[[bool], None]
@@ -92,6 +95,17 @@ class Bus(Closing):
     @abstractmethod
     async def subscribe(self, pattern: str, handler: Handler) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
+
+    @abstractmethod
+    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:
+        """The same without waking the loop: `handler` is called at the next `collect`, or before that if the loop is awake.
+
+        It is not called before what came earlier is handled, whoever that is for.
+        """
+
+    @abstractmethod
+    def collect(self) -> bool:
+        """Have what came until now handled; of a flood only a part. False inside a handler, where it does nothing."""
 
     @abstractmethod
     async def answer(self, pattern: str, handler: Answer) -> Registration:

@@ -6,10 +6,10 @@ turn of the loop than an inbox delivers. All that waits is limited, so that a fl
 
 import asyncio
 import heapq
+from collections.abc import Callable
 
 from lalliance_agents.bus.base import Sample
 from lalliance_agents.bus.inbox import BATCH, Inlet
-from lalliance_agents.clock import MissionClock
 
 #: Size of all that waits, in bytes: of each sample the payload, and `OVERHEAD` for the rest. Some 28,000 announcements.
 MOST_LATE = 2**24
@@ -17,16 +17,17 @@ OVERHEAD = 512
 
 
 class DelayLine:
-    """What waits to be delivered.
+    """What waits to be delivered; instants are seconds of the event loop's clock.
 
     Args:
-        clock: mission time.
+        ring: called when the first sample is due, with the instant until which it is to `deliver`.
     """
 
-    def __init__(self, clock: MissionClock) -> None:
-        self._clock = clock
+    def __init__(self, ring: Callable[[float], object]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._ring = ring
         # A heap by due time; of two due at once the first that came, which is why they are numbered.
-        self._waiting: list[tuple[float, int, Inlet[Sample], Sample]] = []
+        self._waiting: list[tuple[float, int, Inlet[tuple[Sample, float]], Sample]] = []
         self._pushed = 0
         self._size = 0
         self._timer: asyncio.TimerHandle | None = None
@@ -34,19 +35,33 @@ class DelayLine:
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def push(self, delay: float, inlet: Inlet[Sample], sample: Sample) -> bool:
-        """Have the sample delivered in `delay` mission seconds; whether there was room for it."""
+    def push(self, due: float, inlet: Inlet[tuple[Sample, float]], sample: Sample) -> bool:
+        """Have the sample, and the instant, delivered at `due`; whether there was room for it."""
         size = _size(sample)
         if self._size + size > MOST_LATE:
             return False
         self._size += size
         self._pushed += 1
-        heapq.heappush(self._waiting, (self._clock.now() + delay, self._pushed, inlet, sample))
+        heapq.heappush(self._waiting, (due, self._pushed, inlet, sample))
         if self._waiting[0][1] == self._pushed:
             self._arm()
         return True
 
-    def discard(self, inlet: Inlet[Sample] | None = None) -> None:
+    def deliver(self, until: float) -> None:
+        """Deliver what is due by `until`, but no more than an inbox does in one turn of the loop."""
+        if not self._waiting or self._waiting[0][0] > until:
+            return
+        try:
+            for _ in range(BATCH):
+                if not self._waiting or self._waiting[0][0] > until:
+                    break
+                due, _, inlet, sample = heapq.heappop(self._waiting)
+                self._size -= _size(sample)
+                inlet.deliver((sample, due))
+        finally:
+            self._arm()
+
+    def discard(self, inlet: Inlet[tuple[Sample, float]] | None = None) -> None:
         """Let go of what waits for `inlet`; without one, of all."""
         self._waiting = [] if inlet is None else [late for late in self._waiting if late[2] is not inlet]
         heapq.heapify(self._waiting)
@@ -56,21 +71,16 @@ class DelayLine:
     def _arm(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = self._clock.call_at(self._waiting[0][0], self._deliver) if self._waiting else None
+        self._timer = self._loop.call_at(self._waiting[0][0], self._due) if self._waiting else None
 
-    def _deliver(self) -> None:
-        """Deliver what is due, but no more in one turn of the loop than an inbox does."""
-        # A timer may come early by a rounding; the first is due all the same.
-        now = max(self._clock.now(), self._waiting[0][0])
+    def _due(self) -> None:
+        self._timer = None
         try:
-            for _ in range(BATCH):
-                if not self._waiting or self._waiting[0][0] > now:
-                    break
-                _, _, inlet, sample = heapq.heappop(self._waiting)
-                self._size -= _size(sample)
-                inlet.deliver(sample)
+            # A timer may come early by a rounding; the first is due all the same.
+            self._ring(max(self._loop.time(), self._waiting[0][0]))
         finally:
-            self._arm()
+            if self._timer is None:
+                self._arm()
 
 
 def _size(sample: Sample) -> int:

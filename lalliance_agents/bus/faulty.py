@@ -6,7 +6,9 @@ the robot's blindness, be it published or an answer to a query. Nothing else is 
 rule names a message costs one look at a table, and is decoded only by whoever reads it.
 
 What the rules say counts for messages that arrive from then on; what is under way then arrives when it was to. Delays are
-mission time. A delayed message is discarded if its registration or the bus is closed meanwhile, or if too many wait.
+mission time. What waits for its lazy subscriber is delayed from the instant it came, not from when it is collected, and all
+is handed on in the order in which it arrives after its delay. A delayed message is discarded if its registration or the bus
+is closed meanwhile, or if too many wait.
 
 Two accounts are kept, both for this incarnation. `effects`: how many messages each fault touched (lost, delayed, doubled,
 reordered or held back), by sender. `dropped`: the messages that came and were not handed on, by reason: `LOST`, `HELD_BACK` and
@@ -20,6 +22,7 @@ from collections import Counter
 from lalliance_agents.bus.base import (
     Bus,
     Handler,
+    LazyHandler,
     Registration,
     Sample,
 )
@@ -47,6 +50,8 @@ MOST_KEYS = 2**14
 MOST_EFFECTS = 128
 
 _Treatment = tuple[Key, RuledLink | Blindness]
+#: A sample, and when it came, in seconds of the event loop's clock.
+_Arrival = tuple[Sample, float]
 
 
 class FaultyBus(WrappedBus):
@@ -68,13 +73,14 @@ class FaultyBus(WrappedBus):
         # It only listens: what it would put into its headers does not matter.
         self._ear = Messenger(inner, keys, me, 0, clock.now, decode=decode)
         self._decode = decode
-        self._line = DelayLine(clock)
+        self._loop = asyncio.get_running_loop()
+        self._line = DelayLine(self._collect)
         self._touchable = [keys.build(kind) for kind in (Kind.ACTIVITY, Kind.HEARTBEAT, Kind.SENSE_TASK)]
         self._links = LinkRules()
         self._blindness: Blindness | None = None
         self._treatments: dict[str, _Treatment | None] = {}
         self._effects: Counter[tuple[str, str]] = Counter()
-        self._over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._over: asyncio.Future[None] = self._loop.create_future()
 
     def __repr__(self) -> str:
         blind = "blind, " if self._blindness is not None else ""
@@ -111,19 +117,42 @@ class FaultyBus(WrappedBus):
 
     async def subscribe(self, pattern: str, handler: Handler) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, when and as often as the faults let it come."""
-        check_pattern(pattern)
-        if not any(intersects(pattern, touchable) for touchable in self._touchable):
+        if not self._touches(pattern):
             return await self._inner.subscribe(pattern, handler)
-        inlet = Inlet(f"the subscription {pattern!r}", handler)
+        inlet: Inlet[_Arrival] = Inlet(f"the subscription {pattern!r}", lambda arrival: handler(arrival[0]))
+        hearing = await self._inner.subscribe(pattern, lambda sample: self._hear(inlet, sample, self._loop.time()))
+        return _Subscription(hearing, inlet, self._line)
 
-        def hear(sample: Sample) -> None:
-            treatment = self._treatment(sample.key) if self._links.rules or self._blindness is not None else None
-            if treatment is None:
-                handler(sample)
-            else:
-                self._treat(treatment, inlet, sample)
+    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:
+        """The same without waking the loop for what is not late: `handler` is called at the next `collect`, or before that."""
+        if not self._touches(pattern):
+            return await self._inner.subscribe_lazily(pattern, handler)
+        inlet: Inlet[_Arrival] = Inlet(f"the lazy subscription {pattern!r}", lambda arrival: handler(*arrival))
+        hearing = await self._inner.subscribe_lazily(pattern, lambda sample, came: self._hear(inlet, sample, came))
+        return _Subscription(hearing, inlet, self._line)
 
-        return _Subscription(await self._inner.subscribe(pattern, hear), inlet, self._line)
+    def collect(self) -> bool:
+        """Have what arrived until now handled; of a flood only a part. False inside a handler, where it does nothing."""
+        return self._collect(self._loop.time())
+
+    def _collect(self, until: float) -> bool:
+        collected = self._inner.collect()
+        if collected:
+            self._line.deliver(until)
+        return collected
+
+    def _touches(self, pattern: str) -> bool:
+        check_pattern(pattern)
+        return any(intersects(pattern, touchable) for touchable in self._touchable)
+
+    def _hear(self, inlet: Inlet[_Arrival], sample: Sample, came: float) -> None:
+        """Hand a sample on, after those that are to come before it."""
+        self._line.deliver(came)
+        treatment = self._treatment(sample.key) if self._links.rules or self._blindness is not None else None
+        if treatment is None:
+            inlet.deliver((sample, came))
+        else:
+            self._treat(treatment, inlet, sample, came)
 
     async def query(self, pattern: str, payload: bytes = b"", *, timeout: float) -> list[Sample]:  # noqa: ASYNC109 - see Bus.query
         """Ask whoever answers `pattern`; a blind robot gets what the world senses late, or not at all if not in time."""
@@ -179,32 +208,32 @@ class FaultyBus(WrappedBus):
             found = self._links.on(key.robot, self._me)
         return None if found is None else (key, found)
 
-    def _treat(self, treatment: _Treatment, inlet: Inlet[Sample], sample: Sample) -> None:
+    def _treat(self, treatment: _Treatment, inlet: Inlet[_Arrival], sample: Sample, came: float) -> None:
         key, found = treatment
         if isinstance(found, Blindness):
             self._count(found.fault, WORLD)
             if found.delay is None:
                 self._ear.dropped[HELD_BACK] += 1
             else:
-                self._deliver(found.delay, inlet, sample, WORLD)
+                self._deliver(found.delay, inlet, sample, came, WORLD)
             return
         try:
             message = self._decode(key, sample.payload)
         except MessageError:  # whoever reads it will count it
-            inlet.deliver(sample)
+            inlet.deliver((sample, came))
             return
         verdict = found.verdict(message.incarnation, message.seq)
         for fault in verdict.faults:
             self._count(fault, message.sender)
         for delay in verdict.delays:
-            self._deliver(delay, inlet, sample, message.sender)
+            self._deliver(delay, inlet, sample, came, message.sender)
         if not verdict.delays:
             self._ear.dropped[LOST] += 1
 
-    def _deliver(self, delay: float, inlet: Inlet[Sample], sample: Sample, sender: str) -> None:
+    def _deliver(self, delay: float, inlet: Inlet[_Arrival], sample: Sample, came: float, sender: str) -> None:
         if delay <= 0:
-            inlet.deliver(sample)
-        elif not self._line.push(delay, inlet, sample):
+            inlet.deliver((sample, came))
+        elif not self._line.push(came + self._clock.lasts(delay), inlet, sample):
             self._ear.drop(TOO_MANY, sender)
 
     def _count(self, fault: str, sender: str, messages: int = 1) -> None:
@@ -233,7 +262,7 @@ class FaultyBus(WrappedBus):
 class _Subscription:
     """A subscription whose delayed samples end with it."""
 
-    def __init__(self, inner: Registration, inlet: Inlet[Sample], line: DelayLine) -> None:
+    def __init__(self, inner: Registration, inlet: Inlet[_Arrival], line: DelayLine) -> None:
         self._inner = inner
         self._inlet = inlet
         self._line = line

@@ -36,6 +36,7 @@ class Inlet(Generic[Raw]):
     Attributes:
         is_open: false once the registration is taken back; messages still queued are then discarded.
         keep: whether its messages survive a flood.
+        lazy: whether its messages wait until the loop is awake for others, or collects.
     """
 
     def __init__(
@@ -45,9 +46,11 @@ class Inlet(Generic[Raw]):
         *,
         discard: Callable[[Raw], object] | None = None,
         keep: bool = False,
+        lazy: bool = False,
     ) -> None:
         self.is_open = True
         self.keep = keep
+        self.lazy = lazy
         self._name = name
         self._accept = accept
         self._discard = discard
@@ -93,7 +96,8 @@ class Inbox:
 
     Threads that push and the loop hold Python's lock in turns. A loop that is woken by each message takes the lock from the
     thread that has just pushed it, finds nothing more and falls asleep, and most of the time goes into these changes. So when
-    messages come faster than about two in a millisecond, the loop rests for one and then takes all that came.
+    messages come faster than about two in a millisecond, the loop rests for one and then takes all that came. A lazy inlet's
+    messages do not wake it at all, unless they would fill a batch.
 
     Args:
         wake: has a function called once in the loop: `loop.call_soon_threadsafe`, or `loop.call_soon` without threads.
@@ -115,6 +119,7 @@ class Inbox:
         # Older than all that waits: the batch at hand, and what must be kept but reached the old end of a full queue.
         self._ahead: deque[_Queued] = deque()
         self._woken = False
+        self._delivers = False
         self._closed = False
         self._loop = loop
         self._rests = False
@@ -140,9 +145,22 @@ class Inbox:
             self._make_room()
         if self._closed:  # asked last, so that nothing stays that came while it closed
             self.close()
-        elif not self._woken:
+        elif not self._woken and (not inlet.lazy or len(self._waiting) >= BATCH):
             self._woken = True  # two threads may both wake it: a turn too many, and no harm
             self._wake_up()
+
+    def collect(self) -> bool:
+        """Deliver what waits, as far as it is a batch; only in the loop. False inside a handler, where it does nothing."""
+        if self._delivers:
+            return False
+        if len(self) > 0:
+            try:
+                self._deliver_batch()
+            finally:
+                if len(self) > 0 and not self._woken:
+                    self._woken = True
+                    self._wake_up()
+        return True
 
     def close(self) -> None:
         """Discard all that waits and all that comes; a second call does nothing."""
@@ -170,8 +188,15 @@ class Inbox:
             self.close()
 
     def _drain(self) -> None:
+        try:
+            self._deliver_batch()
+        finally:
+            self._go_on()
+
+    def _deliver_batch(self) -> None:
         self._take_batch()
         ahead = self._ahead
+        self._delivers = True
         try:
             for _ in range(BATCH):
                 if not ahead:
@@ -179,7 +204,7 @@ class Inbox:
                 inlet, raw = ahead.popleft()
                 inlet.deliver(raw)
         finally:
-            self._go_on()
+            self._delivers = False
 
     def _go_on(self) -> None:
         """Have the loop woken again: at once if something waits, after a rest if messages throng, else by the next push."""
@@ -211,6 +236,10 @@ class QueuedBus(Bus):
     """A bus whose samples wait in an inbox for the event loop."""
 
     _inbox: Inbox
+
+    def collect(self) -> bool:
+        """Have what came until now handled; of a flood only a part. False inside a handler, where it does nothing."""
+        return self._inbox.collect()
 
     @property
     def dropped_overflow(self) -> int:

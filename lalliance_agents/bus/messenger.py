@@ -37,6 +37,8 @@ CUT_OFF_AFTER = 10
 CUT_OFF_SECONDS = 10.0
 
 Receiver = Callable[[Key, Message], None]
+#: Is told as well when the message came, in seconds of the event loop's clock.
+LazyReceiver = Callable[[Key, Message, float], None]
 
 
 class Messenger:
@@ -118,6 +120,16 @@ class Messenger:
     async def listen(self, pattern: str, receiver: Receiver) -> Registration:
         """Have `receiver` called with each fresh message whose key matches `pattern`."""
         registration = await self.bus.subscribe(pattern, lambda sample: self.take(sample, receiver))
+        self._registrations.append(registration)
+        return registration
+
+    async def listen_lazily(self, pattern: str, receiver: LazyReceiver) -> Registration:
+        """The same without waking the loop; see `Bus.subscribe_lazily`."""
+
+        def take(sample: Sample, came: float) -> None:
+            self.take(sample, lambda key, message: receiver(key, message, came))
+
+        registration = await self.bus.subscribe_lazily(pattern, take)
         self._registrations.append(registration)
         return registration
 

@@ -12,12 +12,15 @@ Who is told of a sample does not change by that, nor when. Whoever made it close
 """
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
 from itertools import product
+from typing import NamedTuple
 
 from lalliance_agents.bus.base import (
     Bus,
     Handler,
+    LazyHandler,
     Registration,
     Sample,
 )
@@ -29,6 +32,29 @@ from lalliance_agents.bus.wrapped import WrappedBus
 MOST_KEYS = 2**14
 
 
+#: A sample, and when it came, in seconds of the event loop's clock; 0 if nobody asks for that.
+_Arrival = tuple[Sample, float]
+_Deliver = Callable[[_Arrival], None]
+_Subscriber = Callable[[_Deliver], Awaitable[Registration]]
+
+
+class _Want(NamedTuple):
+    """What is subscribed to, and how."""
+
+    pattern: str
+    lazy: bool
+
+    def subscriber(self, bus: Bus) -> "_Subscriber":
+        """What subscribes to it on `bus`."""
+
+        async def subscribe(deliver: _Deliver) -> Registration:
+            if self.lazy:
+                return await bus.subscribe_lazily(self.pattern, lambda sample, came: deliver((sample, came)))
+            return await bus.subscribe(self.pattern, lambda sample: deliver((sample, 0.0)))
+
+        return subscribe
+
+
 class SharedBus(WrappedBus):
     """A bus for several participants; closing it closes the inner one.
 
@@ -38,27 +64,39 @@ class SharedBus(WrappedBus):
 
     def __init__(self, inner: Bus) -> None:
         super().__init__(inner)
-        self._channels: dict[str, _Channel] = {}
+        self._channels: dict[_Want, _Channel] = {}
         self._wide: list[_Wide] = []
         self._questions: dict[tuple[str, bytes, float], asyncio.Task[list[Sample]]] = {}
 
     def __repr__(self) -> str:
         return f"<shared bus: {len(self._channels)} patterns, over {self._inner!r}>"
 
-    def widen(self, patterns: Iterable[str]) -> None:
-        """From now on, have subscriptions to what `patterns` match served by one for each of these."""
-        self._wide += [_Wide(pattern, self._inner) for pattern in patterns]
+    def widen(self, patterns: Iterable[str], *, lazy: bool = False) -> None:
+        """From now on, have subscriptions, or lazy ones, to what `patterns` match served by one for each of these."""
+        self._wide += [_Wide(_Want(pattern, lazy), self._inner) for pattern in patterns]
 
     async def subscribe(self, pattern: str, handler: Handler) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
+        inlet: Inlet[_Arrival] = Inlet(f"the subscription {pattern!r}", lambda arrival: handler(arrival[0]))
+        return await self._share(pattern, inlet)
+
+    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:
+        """The same without waking the loop: `handler` is called at the next `collect` of anybody, or before that."""
+        inlet: Inlet[_Arrival] = Inlet(
+            f"the lazy subscription {pattern!r}", lambda arrival: handler(*arrival), lazy=True
+        )
+        return await self._share(pattern, inlet)
+
+    async def _share(self, pattern: str, inlet: Inlet[_Arrival]) -> Registration:
         check_pattern(pattern)
-        inlet: Inlet[Sample] = Inlet(f"the subscription {pattern!r}", handler)
-        channel = self._channels.get(pattern)
+        want = _Want(pattern, inlet.lazy)
+        channel = self._channels.get(want)
         if channel is None:
-            channel = self._channels[pattern] = _Channel(pattern, self._channels)
+            channel = self._channels[want] = _Channel(want, self._channels)
         channel.inlets.append(inlet)
         try:
-            await channel.open(next((wide for wide in self._wide if wide.covers(pattern)), self._inner))
+            wide = next((wide for wide in self._wide if wide.covers(want)), None)
+            await channel.open(want.subscriber(self._inner) if wide is None else wide.subscriber(want))
         except BaseException:
             await channel.leave(inlet)
             raise
@@ -85,31 +123,31 @@ class SharedBus(WrappedBus):
 
 
 class _Channel:
-    """One subscription of the inner bus, and those who share it; it is in `place` under its pattern while there are any."""
+    """One subscription of the inner bus, and those who share it; it is in `place` while there are any."""
 
-    def __init__(self, pattern: str, place: "dict[str, _Channel]") -> None:
-        self.inlets: list[Inlet[Sample]] = []
-        self._pattern = pattern
+    def __init__(self, want: _Want, place: "dict[_Want, _Channel]") -> None:
+        self.inlets: list[Inlet[_Arrival]] = []
+        self._want = want
         self._place = place
         self._opening = asyncio.Lock()
         self._registration: Registration | None = None
 
-    async def open(self, source: "Bus | _Wide") -> None:
+    async def open(self, subscribe: _Subscriber) -> None:
         """Subscribe, unless that was done before."""
         async with self._opening:
             if self._registration is None:
-                self._registration = await source.subscribe(self._pattern, self._deliver)
+                self._registration = await subscribe(self._deliver)
 
-    def _deliver(self, sample: Sample) -> None:
+    def _deliver(self, arrival: _Arrival) -> None:
         for inlet in tuple(self.inlets):
-            inlet.deliver(sample)
+            inlet.deliver(arrival)
 
-    async def leave(self, inlet: Inlet[Sample]) -> None:
+    async def leave(self, inlet: Inlet[_Arrival]) -> None:
         """Deliver nothing more to `inlet`; the subscription ends with the last of them."""
         inlet.is_open = False
         self.inlets.remove(inlet)
-        if not self.inlets and self._place.get(self._pattern) is self:
-            del self._place[self._pattern]
+        if not self.inlets and self._place.get(self._want) is self:
+            del self._place[self._want]
             async with self._opening:
                 if self._registration is not None:
                     await self._registration.close()
@@ -123,7 +161,7 @@ class _Channel:
 class _Share:
     """One participant's part in a channel."""
 
-    def __init__(self, inlet: Inlet[Sample], channel: _Channel) -> None:
+    def __init__(self, inlet: Inlet[_Arrival], channel: _Channel) -> None:
         self._inlet = inlet
         self._channel = channel
 
@@ -136,29 +174,36 @@ class _Share:
 class _Wide:
     """One subscription of the inner bus that serves all those to narrower patterns, for as long as there are any."""
 
-    def __init__(self, pattern: str, bus: Bus) -> None:
-        self._pattern = pattern
-        self._bus = bus
-        self._handlers: dict[str, Handler] = {}
-        self._routes: dict[str, list[Handler]] = {}
+    def __init__(self, want: _Want, bus: Bus) -> None:
+        self._want = want
+        self._subscribe = want.subscriber(bus)
+        self._handlers: dict[str, _Deliver] = {}
+        self._routes: dict[str, list[_Deliver]] = {}
         self._opening = asyncio.Lock()
         self._registration: Registration | None = None
 
-    def covers(self, pattern: str) -> bool:
-        """Whether all that `pattern` matches comes here."""
-        own, asked = self._pattern.split("/"), pattern.split("/")
-        return len(own) == len(asked) and all(
-            wide == narrow or (wide == "*" and narrow != "**" and not narrow.startswith("@"))
-            for wide, narrow in zip(own, asked, strict=True)
+    def covers(self, want: _Want) -> bool:
+        """Whether all that is wanted comes here, and in the same way."""
+        own, asked = self._want.pattern.split("/"), want.pattern.split("/")
+        return (
+            self._want.lazy == want.lazy
+            and len(own) == len(asked)
+            and all(
+                wide == narrow or (wide == "*" and narrow != "**" and not narrow.startswith("@"))
+                for wide, narrow in zip(own, asked, strict=True)
+            )
         )
 
-    async def subscribe(self, pattern: str, handler: Handler) -> Registration:
-        """Have `handler` called with each sample whose key matches `pattern`, to which nobody else here subscribes."""
-        self._handlers[pattern] = handler
+    def subscriber(self, want: _Want) -> _Subscriber:
+        """What subscribes here to `want`, which is covered, and to which nobody else here subscribes."""
+        return partial(self._enter, want.pattern)
+
+    async def _enter(self, pattern: str, deliver: _Deliver) -> Registration:
+        self._handlers[pattern] = deliver
         self._routes.clear()
         async with self._opening:
             if self._registration is None:
-                self._registration = await self._bus.subscribe(self._pattern, self._deliver)
+                self._registration = await self._subscribe(self._deliver)
         return _Narrow(self, pattern)
 
     async def leave(self, pattern: str) -> None:
@@ -171,16 +216,17 @@ class _Wide:
                 registration, self._registration = self._registration, None
                 await registration.close()
 
-    def _deliver(self, sample: Sample) -> None:
-        route = self._routes.get(sample.key)
+    def _deliver(self, arrival: _Arrival) -> None:
+        key = arrival[0].key
+        route = self._routes.get(key)
         if route is None:
             if len(self._routes) >= MOST_KEYS:
                 self._routes.clear()
-            route = self._routes[sample.key] = self._find(sample.key)
-        for handler in route:
-            handler(sample)
+            route = self._routes[key] = self._find(key)
+        for deliver in route:
+            deliver(arrival)
 
-    def _find(self, key: str) -> list[Handler]:
+    def _find(self, key: str) -> list[_Deliver]:
         """Those whose pattern matches `key`: each chunk of it is named there, or is a `*`."""
         chunks = [(chunk,) if chunk.startswith("@") else (chunk, "*") for chunk in key.split("/")]
         patterns = map("/".join, product(*chunks))

@@ -6,6 +6,7 @@ from lalliance_agents.bus.base import (
     ConnectionHandler,
     Delivery,
     Handler,
+    LazyHandler,
     PresenceHandler,
     Publication,
     Registration,
@@ -34,6 +35,14 @@ class WrappedBus(Bus):
     async def subscribe(self, pattern: str, handler: Handler) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
         return await self._inner.subscribe(pattern, handler)
+
+    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:
+        """The same without waking the loop: `handler` is called at the next `collect`, or before that."""
+        return await self._inner.subscribe_lazily(pattern, handler)
+
+    def collect(self) -> bool:
+        """Have what came until now handled; of a flood only a part. False inside a handler, where it does nothing."""
+        return self._inner.collect()
 
     async def answer(self, pattern: str, handler: Answer) -> Registration:
         """Answer queries that match `pattern` with the samples that `handler` returns."""

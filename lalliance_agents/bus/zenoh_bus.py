@@ -18,7 +18,15 @@ from typing import Any, Protocol, TypeVar
 
 import zenoh
 
-from lalliance_agents.bus.base import Answer, ConnectionHandler, Delivery, Handler, PresenceHandler, Sample
+from lalliance_agents.bus.base import (
+    Answer,
+    ConnectionHandler,
+    Delivery,
+    Handler,
+    LazyHandler,
+    PresenceHandler,
+    Sample,
+)
 from lalliance_agents.bus.credentials import Credentials, check_fits
 from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, QueuedBus, answers, check_timeout
 from lalliance_agents.bus.patterns import check_key, check_pattern
@@ -161,6 +169,26 @@ class ZenohBus(QueuedBus):
 
         inlet: Inlet[zenoh.Sample] = Inlet(f"the subscription {pattern!r}", hear)
         return self._declare(inlet, self._session.declare_subscriber(expression, self._listener(inlet)))
+
+    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> "_Declared":
+        """The same without waking the loop: `handler` is called at the next `collect`, or before that."""
+        expression = self._expression(pattern)
+
+        def hear(arrival: tuple[zenoh.Sample, float]) -> None:
+            raw, came = arrival
+            handler(Sample(str(raw.key_expr), raw.payload.to_bytes()), came)
+
+        inlet = Inlet(f"the lazy subscription {pattern!r}", hear, lazy=True)
+        inbox, time = self._inbox, self._loop.time
+
+        def listen(raw: zenoh.Sample) -> None:
+            if not this_thread.known:
+                stay_known()
+            if inbox.admits(len(raw.payload)):
+                inbox.push(inlet, (raw, time()))
+
+        listener = zenoh.handlers.Callback(listen, indirect=False)
+        return self._declare(inlet, self._session.declare_subscriber(expression, listener))
 
     async def answer(self, pattern: str, handler: Answer) -> "_Declared":
         """Answer queries that match `pattern` with the samples that `handler` returns."""

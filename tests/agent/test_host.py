@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from lalliance_agents.agent.host import Host
-from lalliance_agents.bus.base import Delivery, Handler, Registration, Sample
+from lalliance_agents.bus.base import Delivery, Handler, LazyHandler, Registration, Sample
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.shared import SharedBus
 from lalliance_agents.errors import MissionError
@@ -36,11 +36,16 @@ class Counting(MemoryBus):
     def __init__(self, hub: MemoryHub) -> None:
         super().__init__(hub)
         self.patterns: Counter[str] = Counter()
+        self.lazy_patterns: Counter[str] = Counter()
         self.questions: Counter[str] = Counter()
 
     async def subscribe(self, pattern: str, handler: Handler) -> Registration:  # type: ignore[override]
         self.patterns[pattern] += 1
         return await super().subscribe(pattern, handler)
+
+    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:  # type: ignore[override]
+        self.lazy_patterns[pattern] += 1
+        return await super().subscribe_lazily(pattern, handler)
 
     async def query(self, pattern: str, payload: bytes = b"", *, timeout: float) -> list[Sample]:  # noqa: ASYNC109
         self.questions[pattern] += 1
@@ -67,9 +72,10 @@ async def test_hosted_robots_finish_a_mission_each_under_its_name_and_with_its_o
     [fault] = summary["faults"]
     assert fault["fired"]
     assert fault["count"] > 10
-    assert bus.patterns["lalliance/hosted/heartbeat/*"] == bus.patterns["lalliance/hosted/activity/*/*"] == 1
-    assert len(bus.patterns) == 6
-    assert bus.patterns["lalliance/hosted/hello/*"] == bus.patterns["lalliance/hosted/@chaos/rules"] == 1
+    kinds = ("heartbeat/*", "activity/*/*", "hello/*")
+    assert bus.lazy_patterns == {f"lalliance/hosted/{kind}": 1 for kind in kinds}
+    kinds = ("sense/task/*", "sense/robot/*", "@chaos/rules")
+    assert bus.patterns == {f"lalliance/hosted/{kind}": 1 for kind in kinds}
     assert bus.questions["lalliance/hosted/hello/*"] == bus.questions["lalliance/hosted/sense/task/*"] == 1
 
 
@@ -117,6 +123,31 @@ async def test_a_shared_subscription_serves_each_until_it_leaves_and_ends_with_t
         assert publication.has_listeners
         await only.close()
         assert not publication.has_listeners
+
+
+async def test_lazy_and_other_subscribers_of_the_same_share_nothing_but_the_bus() -> None:
+    hub = MemoryHub()
+    inner = Counting(hub)
+    heard: list[tuple[str, str, float]] = []
+    async with SharedBus(inner) as bus, MemoryBus(hub) as other:
+        bus.widen(["m/w/*"], lazy=True)
+        for pattern in ("m/k", "m/w/k"):
+            await bus.subscribe(pattern, lambda sample: heard.append(("eager", sample.key, 0.0)))
+            for name in ("one", "two"):
+                await bus.subscribe_lazily(
+                    pattern, lambda sample, came, name=name: heard.append((name, sample.key, came))
+                )
+        assert (inner.patterns, inner.lazy_patterns) == ({"m/k": 1, "m/w/k": 1}, {"m/k": 1, "m/w/*": 1})
+        for key in ("m/k", "m/w/k"):
+            await asyncio.sleep(1)
+            other.put(key, b"", Delivery.STATE)
+        assert heard == [("eager", "m/k", 0.0), ("one", "m/k", 1.0), ("two", "m/k", 1.0)]
+        await asyncio.sleep(1)
+        assert heard[3:] == [("eager", "m/w/k", 0.0), ("one", "m/w/k", 2.0), ("two", "m/w/k", 2.0)]
+        other.put("m/w/l", b"", Delivery.STATE)
+        await asyncio.sleep(1)
+        assert bus.collect()
+        assert len(heard) == 6
 
 
 async def test_what_a_wide_subscription_brings_goes_to_those_who_asked_for_it_and_to_nobody_else() -> None:

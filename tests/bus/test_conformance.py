@@ -33,6 +33,43 @@ async def test_messages_arrive_in_the_order_of_their_publisher(team, linked, mak
     assert ear.samples == expected
 
 
+async def test_lazy_subscribers_hear_when_each_message_came_and_nothing_before_what_came_earlier(
+    team, linked, eventually, make_ear
+):
+    left, right = await team.bus(), await team.bus()
+    loop = asyncio.get_running_loop()
+    ear, times, nested = make_ear(), [], []
+
+    def hear_lazily(sample, came):
+        ear(sample)
+        times.append(came)
+        nested.append(right.collect())
+
+    await right.subscribe("m/eager", ear)
+    registration = await right.subscribe_lazily("m/lazy", hear_lazily)
+    await linked(left, "m/eager", ear)
+    await eventually(lambda: left.put("m/lazy", b"early", Delivery.STATE) or (right.collect() and ear.samples))
+    left.put("m/eager", b"linked", Delivery.STATE)
+    await ear.until(b"linked")
+    ear.samples.clear()
+    times.clear()
+    began = loop.time()
+    for number in range(8):
+        left.put("m/lazy" if number % 4 else "m/eager", b"%d" % number, Delivery.STATE)
+    await eventually(lambda: right.collect() and len(ear.samples) == 8)
+    assert ear.payloads == [b"%d" % number for number in range(8)]
+    instants = [began, *times, loop.time()]
+    assert instants == sorted(instants)
+    assert len(times) == 6
+    assert not any(nested)
+    await registration.close()
+    left.put("m/lazy", b"too late", Delivery.STATE)
+    left.put("m/eager", b"last", Delivery.STATE)
+    await ear.until(b"last")
+    assert ear.payloads[8:] == [b"last"]
+    assert ear.threads == {threading.get_ident()}
+
+
 @pytest.mark.parametrize("delivery", Delivery)
 async def test_put_reaches_subscribers_with_every_delivery(team, linked, delivery, make_ear):
     left, right = await team.bus(), await team.bus()

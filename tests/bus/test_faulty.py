@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 from support.faulty_stage import KEYS, LATE, RULES, Stage, blind, rule
+from support.virtual_time import VirtualTimeLoop
 
 from lalliance_agents.bus import delay_line, faulty
 from lalliance_agents.bus.base import Delivery, Registration, Sample
@@ -47,11 +48,13 @@ SOME = [
 
 @pytest.mark.parametrize("speed", [1.0, 20.0])
 @pytest.mark.parametrize("one", SOME, ids=lambda one: one.fault)
-async def test_each_rule_does_to_each_message_what_its_verdict_says(one: LinkRule, speed: float) -> None:
-    """Activity and heartbeats alike; delays are mission time, whatever the clock's speed."""
+@pytest.mark.parametrize("lazy", [False, True], ids=["at once", "lazily"])
+async def test_each_rule_does_to_each_message_what_its_verdict_says(one: LinkRule, speed: float, lazy: bool) -> None:
+    """Activity and heartbeats alike; delays are mission time, whatever the clock's speed and whenever they are collected."""
     stage = Stage(speed)
     await stage.obey(one, seed=11)
-    await stage.listen(KEYS.build(Kind.HEARTBEAT), KEYS.build(Kind.ACTIVITY, task="a"))
+    listen = stage.listen_lazily if lazy else stage.listen
+    await listen(KEYS.build(Kind.HEARTBEAT), KEYS.build(Kind.ACTIVITY, task="a"))
     on, start = LinkRules(11, [one]).on("left", "right"), stage.clock.now()
     assert on is not None
     expected, touched, lost = [], 0, 0
@@ -65,7 +68,10 @@ async def test_each_rule_does_to_each_message_what_its_verdict_says(one: LinkRul
         touched += len(verdict.faults)
         lost += not verdict.delays
         await stage.pause(0.1)
+        if seq % 4 == 0:
+            stage.bus.collect()
     await stage.pause(60.0)
+    stage.bus.collect()
     assert [text for _, text in stage.log] == [text for _, text in sorted(expected, key=lambda each: each[0])]
     assert [at for at, _ in stage.log] == pytest.approx([at for at, _ in sorted(expected)], abs=2e-6)
     assert stage.effects() == {(one.fault, "left"): touched}
@@ -272,6 +278,30 @@ async def test_a_handler_may_take_its_registration_back_while_it_is_called_with_
     await stage.pause(2.0)
     assert stage.log == [(1.0, "left 1"), (1.0, "left 1")]
     assert len(stage.bus._line) == 0
+
+
+async def test_what_waited_to_be_collected_comes_in_the_order_of_its_arrival_after_the_delay() -> None:
+    """Delayed or not, and even where a loop that was held up hears of messages only after they were due."""
+    stage = Stage()
+    await stage.obey(rule(**LATE))
+    await stage.listen_lazily()
+    third = stage.voice("third")
+    for sender in (stage.left, third, stage.left):
+        stage.beat(by=sender)
+        hold_up(0.6)
+    stage.beat(by=third)
+    assert stage.log == []
+    stage.bus.collect()
+    assert stage.take_log() == [(0.6, "third 1"), (1.0, "left 1"), (1.8, "third 2")]
+    await stage.pause(1.0)
+    assert stage.take_log() == [(2.2, "left 2")]
+
+
+def hold_up(seconds: float) -> None:
+    """Let time pass as where the loop's thread is busy: no timer is looked at."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
+    loop.hold_up(seconds)
 
 
 async def test_a_handler_that_raises_harms_nothing_that_comes_after(caplog: pytest.LogCaptureFixture) -> None:

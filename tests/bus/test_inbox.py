@@ -83,6 +83,66 @@ def test_one_wake_up_per_batch_and_a_bounded_batch_per_turn() -> None:
     assert turns.turn() == 0
 
 
+def test_lazy_messages_wake_nobody_and_come_in_their_turn_when_they_are_collected_or_somebody_is_woken() -> None:
+    turns, heard = Turns(), []
+    inbox = Inbox(turns.wake)
+    lazy, eager = Inlet("lazy", heard.append, lazy=True), Inlet("eager", heard.append)
+    for number in range(2):
+        inbox.push(lazy, number)
+    assert (turns.scheduled, heard) == ([], [])
+    assert inbox.collect()
+    assert (turns.scheduled, heard) == ([], [0, 1])
+    inbox.push(lazy, 2)
+    inbox.push(eager, 3)
+    inbox.push(lazy, 4)
+    assert (turns.turn(), heard) == (1, [0, 1, 2, 3, 4])
+    inbox.push(eager, 5)
+    assert inbox.collect()
+    assert heard[5:] == [5]
+    assert (turns.turn(), turns.turn()) == (1, 0)
+    inbox.push(lazy, 6)
+    assert (turns.scheduled, len(inbox)) == ([], 1)
+
+
+def test_a_flood_of_lazy_messages_wakes_the_loop_once_and_however_often_it_is_collected() -> None:
+    turns, heard = Turns(), []
+    inbox = Inbox(turns.wake)
+    lazy = Inlet("lazy", heard.append, lazy=True)
+    for number in range(5 * BATCH):
+        inbox.push(lazy, number)
+    assert len(turns.scheduled) == 1
+    for _ in range(2):
+        assert inbox.collect()
+    assert (len(turns.scheduled), heard) == (1, list(range(2 * BATCH)))
+    assert [turns.turn() for _ in range(4)] == [1, 1, 1, 0]
+    assert heard == list(range(5 * BATCH))
+
+
+def test_what_collecting_leaves_over_is_delivered_without_being_collected() -> None:
+    turns, heard = Turns(), []
+    inbox = Inbox(turns.wake)
+
+    def fail(_: int) -> None:
+        raise KeyboardInterrupt
+
+    inbox.push(Inlet("fail", fail, lazy=True), 0)
+    inbox.push(Inlet("lazy", heard.append, lazy=True), 1)
+    with pytest.raises(KeyboardInterrupt):
+        inbox.collect()
+    assert heard == []
+    assert (turns.turn(), heard) == (1, [1])
+
+
+def test_a_handler_that_collects_is_told_that_it_cannot() -> None:
+    turns, heard = Turns(), []
+    inbox = Inbox(turns.wake)
+    inbox.push(Inlet("x", lambda _: heard.append(inbox.collect())), 0)
+    inbox.push(Inlet("y", heard.append), 1)
+    turns.turn()
+    assert heard == [False, 1]
+    assert inbox.collect()
+
+
 def test_a_flood_drops_the_oldest_but_nothing_that_must_be_kept() -> None:
     turns, heard, dropped = Turns(), [], []
     inbox = Inbox(turns.wake)

@@ -68,6 +68,17 @@ class Stage:
     async def listen(self, *patterns: str) -> list[Registration]:
         return [await self.bus.subscribe(pattern, self.hear) for pattern in patterns or [KEYS.build(Kind.HEARTBEAT)]]
 
+    def hear_lazily(self, sample: Sample, came: float) -> None:
+        """The same with the instant at which it came."""
+        self.hear(sample)
+        self.log[-1] = (round(self.clock.at(came), 6), self.log[-1][1])
+
+    async def listen_lazily(self, *patterns: str) -> list[Registration]:
+        return [
+            await self.bus.subscribe_lazily(pattern, self.hear_lazily)
+            for pattern in patterns or [KEYS.build(Kind.HEARTBEAT)]
+        ]
+
     def beat(self, count: int = 1, by: Messenger | None = None) -> None:
         for _ in range(count):
             (by or self.left).send(Kind.HEARTBEAT, trial=1)

@@ -47,6 +47,10 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         return self._jumping.now
 
+    def hold_up(self, seconds: float) -> None:
+        """Let time pass in the middle of a turn, as when a handler takes long: no timer is looked at."""
+        self._jumping.now += seconds
+
     def run_in_executor(self, executor: Any, func: Any, *args: Any) -> asyncio.Future[Any]:  # type: ignore[override]
         """Work given to a thread is done at once: the clock must not jump while it goes on."""
         future = self.create_future()
