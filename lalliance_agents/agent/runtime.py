@@ -14,11 +14,12 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
 from lalliance_agents.agent import translate
-from lalliance_agents.agent.behavior import BehaviorSet, complete_repertoire, described
+from lalliance_agents.agent.behavior import BehaviorSet, complete_repertoire
 from lalliance_agents.agent.briefing import chance_of, new_mind, roster, tasks_of
 from lalliance_agents.agent.catalog import Catalog, fresh_incarnation
 from lalliance_agents.agent.performer import Performer
 from lalliance_agents.agent.reports import Reports
+from lalliance_agents.agent.senses import Senses
 from lalliance_agents.agent.team import Team
 from lalliance_agents.bus.base import Bus, Delivery, Publication, Registration, Sample
 from lalliance_agents.bus.faulty import FaultyBus
@@ -47,6 +48,8 @@ _log = logging.getLogger(__name__)
 GREETING_TIMEOUT = 1.0
 #: Robots listened to at most, unless the mission itself has more: hostile names cannot fill the memory.
 MOST_TEAMMATES = 1024
+#: After so many control periods without one a robot was held up.
+HELD_UP = 2.0
 #: Time between two refreshes of the action and the report, and of the rarer greeting, in mission seconds.
 REFRESH_PERIOD = 1.0
 GREETING_PERIOD = 10.0
@@ -119,9 +122,7 @@ class Robot:
         self._trial = 0 if world else 1
         #: When the trial began, as far as the world has told; None: nobody tells.
         self._trial_began: float | None = None
-        self._told: dict[str, tuple[bool, bool]] = {}
-        self._broken: set[str] = set()
-        self._contradicted: set[str] = set()
+        self._senses = Senses()
         self._store_failed = False
         self._saved_version = self.mind.knowledge.version
         self._saving: asyncio.Task[None] | None = None
@@ -225,7 +226,16 @@ class Robot:
             self._messenger.drop("other trial", message.sender)
         else:
             self._reports.heard(message.sender)
-            self._tell(translate.heard(message), self._clock.at(came))
+            self._tell(translate.heard(message), self._heard_at(self._clock.at(came)))
+
+    def _heard_at(self, came: float) -> float:
+        """When a message that came at `came` counts as heard: then, or now if this robot was held up.
+
+        Who was held up meets a part of what came meanwhile, the oldest first, before its next step; it must not find
+        teammates silent whose later messages it has not looked at.
+        """
+        now = self._clock.now()
+        return came if now - came < HELD_UP * self._mission.control_period else now
 
     def _receive_sense(self, key: Key, message: Message) -> None:
         if isinstance(message, TaskState) and key.task in self._repertoire and message.trial >= self._trial:
@@ -269,34 +279,13 @@ class Robot:
         self._trial = trial
         self._trial_began = self._clock.now()
         self._performer.stop_all()
-        self._told.clear()
-        for one in self._repertoire.values():
-            one.sensed = None
-            one.returned = False
+        self._senses.forget(self._repertoire.values())
         self._tell(TrialStarted(translate.learning(learning)))
 
     def _feel(self, one: BehaviorSet) -> None:
-        """Ask a behaviour set how its task stands, and tell the mind if that has changed; not before the first trial."""
-        if self._trial == 0:
-            return
-        try:
-            felt = bool(one.applicable()), self._is_complete(one)
-        except (Exception, SystemExit):
-            if one.task not in self._broken:
-                self._broken.add(one.task)
-                _log.exception("sensing of %s failed; taken as not applicable", described(one))
-            felt = False, False
-        if self._told.get(one.task) != felt:
-            self._told[one.task] = felt
-            self._tell(translate.sensed(one.task, *felt))
-
-    def _is_complete(self, one: BehaviorSet) -> bool:
-        """What the set says; and where there is a world, that decides when a task is done."""
-        says = bool(one.complete())
-        if one.sensed is not None and says and not one.sensed.complete and one.task not in self._contradicted:
-            self._contradicted.add(one.task)
-            _log.warning("%s says that its task is complete, and the world says that it is not", described(one))
-        return says or (one.sensed is not None and one.sensed.complete)
+        """Tell the mind how a task stands, if that has changed; not before the first trial."""
+        if self._trial > 0 and (changed := self._senses.feel(one)) is not None:
+            self._tell(changed)
 
     def _body_failed(self, one: BehaviorSet) -> None:
         self._tell(BodyFailed(one.task))

@@ -8,12 +8,14 @@ from types import TracebackType
 from typing import Any, Self
 
 import pytest
+from support.virtual_time import hold_up
 
 from lalliance_agents import BehaviorSet, Robot
 from lalliance_agents.agent import runtime
 from lalliance_agents.agent.behavior import AutonomousBehaviorSet
 from lalliance_agents.agent.catalog import Catalog
 from lalliance_agents.bus.base import Sample
+from lalliance_agents.bus.inbox import BATCH
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.config import Mission
@@ -45,6 +47,10 @@ class SlowBus(MemoryBus):
     async def subscribe(self, *given: Any) -> Any:
         await asyncio.sleep(0)
         return await super().subscribe(*given)
+
+    async def subscribe_lazily(self, *given: Any) -> Any:
+        await asyncio.sleep(0)
+        return await super().subscribe_lazily(*given)
 
     async def announce_presence(self, key: str) -> Any:
         await asyncio.sleep(0)
@@ -127,6 +133,42 @@ class Logged(BehaviorSet):
             await asyncio.sleep(1e6 if self._returns_after is None else self._returns_after)
         finally:
             self.log.append("ends")
+
+
+async def test_a_teammate_counts_as_heard_when_its_message_came_not_when_it_was_collected() -> None:
+    async with Stage() as stage:
+        await stage.begin()
+        mate, presences = stage.voice("right"), stage.robot.mind.hearing.presences
+        loop = asyncio.get_running_loop()
+        for wait in (0.5, 0.13, 0.02, 0.31):
+            await asyncio.sleep(wait)
+            came = loop.time()
+            mate.send(Kind.HEARTBEAT, trial=1)
+            await asyncio.sleep(2 * stage.mission.control_period)
+            assert presences["right"].last == pytest.approx(came)
+
+
+async def test_a_robot_that_was_held_up_does_not_take_its_teammates_for_silent() -> None:
+    """It meets only a part of what waited before its next step, and the rest after it."""
+    async with Stage() as stage:
+        await stage.begin()
+        mates = [stage.voice("right"), stage.voice("stranger")]
+        mates[1].send(Kind.HELLO, tasks=["a"])
+        await asyncio.sleep(0.5)
+        tau = stage.mission.parameters.silence_timeout
+        for _ in range(BATCH):
+            mates[0].send(Kind.HEARTBEAT, trial=1)
+            mates[1].send(Kind.HEARTBEAT, trial=1)
+        hold_up(2 * tau)
+        mates[0].send(Kind.HEARTBEAT, trial=1)
+        await asyncio.sleep(0)
+        silences = []
+        for _ in range(20):
+            silences += stage.robot.mind.hearing.silences(asyncio.get_running_loop().time()).values()
+            await asyncio.sleep(0.01)
+        assert max(silences[4:]) < tau
+        presences = stage.robot.mind.hearing.presences
+        assert [presences[name].lapses for name in ("right", "stranger")] == [0, 0]
 
 
 async def leave_nothing(stage: Stage, performed: Logged) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 from support.faulty_stage import KEYS, LATE, RULES, Stage, blind, rule
-from support.virtual_time import VirtualTimeLoop
+from support.virtual_time import hold_up
 
 from lalliance_agents.bus import delay_line, faulty
 from lalliance_agents.bus.base import Delivery, Registration, Sample
@@ -295,13 +295,6 @@ async def test_what_waited_to_be_collected_comes_in_the_order_of_its_arrival_aft
     assert stage.take_log() == [(0.6, "third 1"), (1.0, "left 1"), (1.8, "third 2")]
     await stage.pause(1.0)
     assert stage.take_log() == [(2.2, "left 2")]
-
-
-def hold_up(seconds: float) -> None:
-    """Let time pass as where the loop's thread is busy: no timer is looked at."""
-    loop = asyncio.get_running_loop()
-    assert isinstance(loop, VirtualTimeLoop)
-    loop.hold_up(seconds)
 
 
 async def test_a_handler_that_raises_harms_nothing_that_comes_after(caplog: pytest.LogCaptureFixture) -> None:

@@ -59,3 +59,10 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         except Exception as error:
             future.set_exception(error)
         return future
+
+
+def hold_up(seconds: float) -> None:
+    """Let time pass as where the running loop's thread is busy: no timer is looked at."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
+    loop.hold_up(seconds)
