@@ -14,6 +14,8 @@ FILES = [
     "examples/greenhouse/test_greenhouse.py",
     "examples/patrol/patrol.yaml",
     "examples/patrol/watchman.py",
+    "examples/rounds/base.py",
+    "examples/rounds/rounds.yaml",
 ]
 
 

@@ -102,6 +102,9 @@ DONE_ALIKE = {
         "lalliance router --listen tcp/127.0.0.1:7447": (
             "examples/test_examples.py::test_a_watchman_without_a_world_goes_on_where_another_one_died"
         ),
+        "lalliance robot rounds.yaml --connect tcp/10.0.0.1:7447 --name red --without-world": (
+            "examples/test_examples.py::test_bases_under_ros_share_their_rounds_and_stop_when_their_robot_does"
+        ),
     },
     # The mission of the test lasts for as long as it is looked at.
     "docs/watching.md": {"lalliance run missions/material_handling.yaml --record mission.mcap": WATCHING},

@@ -1,0 +1,1 @@
+"""Messages of this name, as far as examples/rounds uses them."""

@@ -1,0 +1,7 @@
+"""Who handles signals."""
+
+from enum import Enum
+
+
+class SignalHandlerOptions(Enum):
+    NO = 0
