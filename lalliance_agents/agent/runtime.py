@@ -157,6 +157,7 @@ class Robot:
 
     async def _join(self) -> None:
         keys, listen = self._keys, self._messenger.listen
+        self._tell(roster(self._mission, self.name))
         if self._world:  # before the first message comes to which a rule applies
             await self._bus.obey(timeout=GREETING_TIMEOUT)
         if not self._hears_elsewhere:
@@ -164,15 +165,14 @@ class Robot:
                 await self._messenger.listen_lazily(keys.build(Kind.ACTIVITY, task=task), self._receive_presence)
         for teammate in self._team.abilities:
             await self._listen_to(teammate)
-        await self._messenger.listen_lazily(keys.build(Kind.HELLO), self._receive_hello)
+        await self._messenger.listen_lazily(
+            keys.build(Kind.HELLO), lambda key, message, _: self._receive_hello(key, message)
+        )
         await self._messenger.offer(keys.build(Kind.HELLO, robot=self.name), self._own_hello)
         self._motivations = await self._bus.publication(
             keys.build(Kind.MOTIVATION, robot=self.name), Delivery.TELEMETRY
         )
-        self._tell(roster(self._mission, self.name))
-        questions: dict[str, Receiver] = {
-            keys.build(Kind.HELLO): lambda key, message: self._receive_hello(key, message, 0.0)
-        }
+        questions: dict[str, Receiver] = {keys.build(Kind.HELLO): self._receive_hello}
         if self._world:
             body = keys.build(Kind.SENSE_ROBOT, robot=self.name)
             for task in self._repertoire:
@@ -209,7 +209,7 @@ class Robot:
         await self._save()
 
     def _tell(self, event: Event, at: float | None = None) -> None:
-        """Tell the mind of something that was perceived at the instant `at`, or now; what came before, it knows by then."""
+        """Tell the mind of something that was perceived at the instant `at`, or now, after what had come by then."""
         if at is None:
             self._bus.collect()
             at = self._clock.now()
@@ -253,7 +253,7 @@ class Robot:
             if message.elapsed is not None and message.trial == self._trial:
                 self._trial_began = self._clock.now() - message.elapsed
 
-    def _receive_hello(self, _: Key, message: Message, __: float) -> None:
+    def _receive_hello(self, _: Key, message: Message) -> None:
         if not isinstance(message, Hello):
             return
         tasks = frozenset(message.tasks)

@@ -27,6 +27,8 @@ class Sample(NamedTuple):
 
     key: str
     payload: bytes
+    came: float = 0.0
+    """When it came, in seconds of the event loop's clock, if it was subscribed to lazily."""
 
 
 class Delivery(StrEnum):
@@ -38,8 +40,6 @@ class Delivery(StrEnum):
 
 
 Handler = Callable[[Sample], None]
-#: Is handed a sample, and when it came, in seconds of the event loop's clock.
-LazyHandler = Callable[[Sample, float], None]
 Answer = Callable[[Sample], list[Sample]]
 PresenceHandler = Callable[[str, bool], None]
 ConnectionHandler = Callable[[bool], None]
@@ -93,14 +93,11 @@ class Bus(Closing):
         """Declare a key that will be published on often."""
 
     @abstractmethod
-    async def subscribe(self, pattern: str, handler: Handler) -> Registration:
-        """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
+    async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool = False) -> Registration:
+        """Have `handler` called with each sample whose key matches `pattern`, from about now on.
 
-    @abstractmethod
-    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:
-        """The same without waking the loop: `handler` is called at the next `collect`, or before that if the loop is awake.
-
-        It is not called before what came earlier is handled, whoever that is for.
+        What is subscribed to lazily does not wake the loop: it waits until somebody collects, or the loop is awake for another
+        sample, and comes in its turn between the others.
         """
 
     @abstractmethod

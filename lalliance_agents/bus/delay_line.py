@@ -27,7 +27,7 @@ class DelayLine:
         self._loop = asyncio.get_running_loop()
         self._ring = ring
         # A heap by due time; of two due at once the first that came, which is why they are numbered.
-        self._waiting: list[tuple[float, int, Inlet[tuple[Sample, float]], Sample]] = []
+        self._waiting: list[tuple[float, int, Inlet[Sample], Sample]] = []
         self._pushed = 0
         self._size = 0
         self._timer: asyncio.TimerHandle | None = None
@@ -35,8 +35,8 @@ class DelayLine:
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def push(self, due: float, inlet: Inlet[tuple[Sample, float]], sample: Sample) -> bool:
-        """Have the sample, and the instant, delivered at `due`; whether there was room for it."""
+    def push(self, due: float, inlet: Inlet[Sample], sample: Sample) -> bool:
+        """Have the sample delivered at `due`, as one that came then; whether there was room for it."""
         size = _size(sample)
         if self._size + size > MOST_LATE:
             return False
@@ -57,11 +57,11 @@ class DelayLine:
                     break
                 due, _, inlet, sample = heapq.heappop(self._waiting)
                 self._size -= _size(sample)
-                inlet.deliver((sample, due))
+                inlet.deliver(sample._replace(came=due) if inlet.lazy else sample)
         finally:
             self._arm()
 
-    def discard(self, inlet: Inlet[tuple[Sample, float]] | None = None) -> None:
+    def discard(self, inlet: Inlet[Sample] | None = None) -> None:
         """Let go of what waits for `inlet`; without one, of all."""
         self._waiting = [] if inlet is None else [late for late in self._waiting if late[2] is not inlet]
         heapq.heapify(self._waiting)

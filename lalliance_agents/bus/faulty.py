@@ -22,7 +22,6 @@ from collections import Counter
 from lalliance_agents.bus.base import (
     Bus,
     Handler,
-    LazyHandler,
     Registration,
     Sample,
 )
@@ -50,8 +49,6 @@ MOST_KEYS = 2**14
 MOST_EFFECTS = 128
 
 _Treatment = tuple[Key, RuledLink | Blindness]
-#: A sample, and when it came, in seconds of the event loop's clock.
-_Arrival = tuple[Sample, float]
 
 
 class FaultyBus(WrappedBus):
@@ -115,21 +112,20 @@ class FaultyBus(WrappedBus):
         self._line.discard()
         await self._ear.close()
 
-    async def subscribe(self, pattern: str, handler: Handler) -> Registration:
+    async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool = False) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, when and as often as the faults let it come."""
-        if not self._touches(pattern):
-            return await self._inner.subscribe(pattern, handler)
-        inlet: Inlet[_Arrival] = Inlet(f"the subscription {pattern!r}", lambda arrival: handler(arrival[0]))
-        hearing = await self._inner.subscribe(pattern, lambda sample: self._hear(inlet, sample, self._loop.time()))
-        return _Subscription(hearing, inlet, self._line)
+        check_pattern(pattern)
+        if not any(intersects(pattern, touchable) for touchable in self._touchable):
+            return await self._inner.subscribe(pattern, handler, lazy=lazy)
+        inlet = Inlet(f"the subscription {pattern!r}", handler, lazy=lazy)
 
-    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:
-        """The same without waking the loop for what is not late: `handler` is called at the next `collect`, or before that."""
-        if not self._touches(pattern):
-            return await self._inner.subscribe_lazily(pattern, handler)
-        inlet: Inlet[_Arrival] = Inlet(f"the lazy subscription {pattern!r}", lambda arrival: handler(*arrival))
-        hearing = await self._inner.subscribe_lazily(pattern, lambda sample, came: self._hear(inlet, sample, came))
-        return _Subscription(hearing, inlet, self._line)
+        def hear(sample: Sample) -> None:
+            if self._links.rules or self._blindness is not None or len(self._line) > 0:
+                self._hear(inlet, sample)
+            else:
+                handler(sample)
+
+        return _Subscription(await self._inner.subscribe(pattern, hear, lazy=lazy), inlet, self._line)
 
     def collect(self) -> bool:
         """Have what arrived until now handled; of a flood only a part. False inside a handler, where it does nothing."""
@@ -141,16 +137,13 @@ class FaultyBus(WrappedBus):
             self._line.deliver(until)
         return collected
 
-    def _touches(self, pattern: str) -> bool:
-        check_pattern(pattern)
-        return any(intersects(pattern, touchable) for touchable in self._touchable)
-
-    def _hear(self, inlet: Inlet[_Arrival], sample: Sample, came: float) -> None:
+    def _hear(self, inlet: Inlet[Sample], sample: Sample) -> None:
         """Hand a sample on, after those that are to come before it."""
+        came = sample.came if inlet.lazy else self._loop.time()
         self._line.deliver(came)
-        treatment = self._treatment(sample.key) if self._links.rules or self._blindness is not None else None
+        treatment = self._treatment(sample.key)
         if treatment is None:
-            inlet.deliver((sample, came))
+            inlet.deliver(sample)
         else:
             self._treat(treatment, inlet, sample, came)
 
@@ -208,7 +201,7 @@ class FaultyBus(WrappedBus):
             found = self._links.on(key.robot, self._me)
         return None if found is None else (key, found)
 
-    def _treat(self, treatment: _Treatment, inlet: Inlet[_Arrival], sample: Sample, came: float) -> None:
+    def _treat(self, treatment: _Treatment, inlet: Inlet[Sample], sample: Sample, came: float) -> None:
         key, found = treatment
         if isinstance(found, Blindness):
             self._count(found.fault, WORLD)
@@ -220,7 +213,7 @@ class FaultyBus(WrappedBus):
         try:
             message = self._decode(key, sample.payload)
         except MessageError:  # whoever reads it will count it
-            inlet.deliver((sample, came))
+            inlet.deliver(sample)
             return
         verdict = found.verdict(message.incarnation, message.seq)
         for fault in verdict.faults:
@@ -230,9 +223,9 @@ class FaultyBus(WrappedBus):
         if not verdict.delays:
             self._ear.dropped[LOST] += 1
 
-    def _deliver(self, delay: float, inlet: Inlet[_Arrival], sample: Sample, came: float, sender: str) -> None:
+    def _deliver(self, delay: float, inlet: Inlet[Sample], sample: Sample, came: float, sender: str) -> None:
         if delay <= 0:
-            inlet.deliver((sample, came))
+            inlet.deliver(sample)
         elif not self._line.push(came + self._clock.lasts(delay), inlet, sample):
             self._ear.drop(TOO_MANY, sender)
 
@@ -262,7 +255,7 @@ class FaultyBus(WrappedBus):
 class _Subscription:
     """A subscription whose delayed samples end with it."""
 
-    def __init__(self, inner: Registration, inlet: Inlet[_Arrival], line: DelayLine) -> None:
+    def __init__(self, inner: Registration, inlet: Inlet[Sample], line: DelayLine) -> None:
         self._inner = inner
         self._inlet = inlet
         self._line = line

@@ -123,7 +123,7 @@ class Inbox:
         self._closed = False
         self._loop = loop
         self._rests = False
-        self._emptied = -math.inf
+        self._emptied = self._next_collection = -math.inf
         # Messages since the queue was last empty.
         self._found = 0
 
@@ -150,17 +150,29 @@ class Inbox:
             self._wake_up()
 
     def collect(self) -> bool:
-        """Deliver what waits, as far as it is a batch; only in the loop. False inside a handler, where it does nothing."""
+        """Deliver what waits, as far as it is a batch; only in the loop. False inside a handler, where it does nothing.
+
+        Where many collect, this takes no more than half of the time, and comes at most as often as the loop would be woken.
+        """
         if self._delivers:
             return False
-        if len(self) > 0:
+        if len(self) > 0 and not self._collected_just_now():
+            began = self._time()
             try:
                 self._deliver_batch()
             finally:
+                ended = self._time()
+                self._next_collection = ended + max(ended - began, REST)
                 if len(self) > 0 and not self._woken:
                     self._woken = True
                     self._wake_up()
         return True
+
+    def _collected_just_now(self) -> bool:
+        return self._loop is not None and self._loop.time() < self._next_collection
+
+    def _time(self) -> float:
+        return 0.0 if self._loop is None else self._loop.time()
 
     def close(self) -> None:
         """Discard all that waits and all that comes; a second call does nothing."""

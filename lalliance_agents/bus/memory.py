@@ -9,28 +9,18 @@ import asyncio
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from lalliance_agents.bus.base import (
-    Answer,
-    ConnectionHandler,
-    Delivery,
-    Handler,
-    LazyHandler,
-    PresenceHandler,
-    Sample,
-)
+from lalliance_agents.bus.base import Answer, ConnectionHandler, Delivery, Handler, PresenceHandler, Sample
 from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, QueuedBus, answers, check_timeout
 from lalliance_agents.bus.patterns import check_key, check_pattern, intersects, matches
 
 Raw = TypeVar("Raw")
-#: A sample, and when it came.
-_Arrival = tuple[Sample, float]
 
 
 class MemoryHub:
     """Where the participants of one in-memory bus meet; the router's place. All it holds is the participants' business."""
 
     def __init__(self) -> None:
-        self._subscriptions: list[_Declared[_Arrival]] = []
+        self._subscriptions: list[_Declared[Sample]] = []
         self._answerers: list[_Declared[_Ask]] = []
         self._watchers: list[_Declared[tuple[str, bool]]] = []
         self._presences: list[_Presence] = []
@@ -72,7 +62,7 @@ class MemoryHub:
 
     def _forget(self, bus: "MemoryBus") -> None:
         declared: list[
-            _Declared[_Arrival] | _Declared[_Ask] | _Declared[tuple[str, bool]] | _Declared[bool] | _Presence
+            _Declared[Sample] | _Declared[_Ask] | _Declared[tuple[str, bool]] | _Declared[bool] | _Presence
         ] = []
         declared += [*self._subscriptions, *self._answerers, *self._watchers, *self._connections, *self._presences]
         for each in declared:
@@ -98,10 +88,10 @@ class MemoryBus(QueuedBus):
         check_key(key)
         if self._closed or not self._hub._is_up:
             return
-        arrival = Sample(key, payload), self._loop.time()
+        now = self._loop.time()
         for each in self._hub._subscriptions:
             if matches(each.pattern, key) and each.owner._inbox.admits(len(payload)):
-                each.owner._inbox.push(each.inlet, arrival)
+                each.owner._inbox.push(each.inlet, Sample(key, payload, now if each.inlet.lazy else 0.0))
 
     async def publication(self, key: str, delivery: Delivery) -> "MemoryPublication":
         """Declare a key that will be published on often."""
@@ -109,18 +99,10 @@ class MemoryBus(QueuedBus):
         self._check_open()
         return MemoryPublication(self, key, delivery)
 
-    async def subscribe(self, pattern: str, handler: Handler) -> "_Declared[_Arrival]":
+    async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool = False) -> "_Declared[Sample]":
         """Have `handler` called with each sample whose key matches `pattern`, from now on."""
         self._check(pattern)
-        inlet: Inlet[_Arrival] = Inlet(f"the subscription {pattern!r}", lambda arrival: handler(arrival[0]))
-        return _Declared(self, pattern, inlet, self._hub._subscriptions)
-
-    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> "_Declared[_Arrival]":
-        """The same without waking the loop: `handler` is called at the next `collect`, or before that."""
-        self._check(pattern)
-        inlet: Inlet[_Arrival] = Inlet(
-            f"the lazy subscription {pattern!r}", lambda arrival: handler(*arrival), lazy=True
-        )
+        inlet = Inlet(f"the subscription {pattern!r}", handler, lazy=lazy)
         return _Declared(self, pattern, inlet, self._hub._subscriptions)
 
     async def answer(self, pattern: str, handler: Answer) -> "_Declared[_Ask]":

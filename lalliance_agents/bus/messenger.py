@@ -124,12 +124,10 @@ class Messenger:
         return registration
 
     async def listen_lazily(self, pattern: str, receiver: LazyReceiver) -> Registration:
-        """The same without waking the loop; see `Bus.subscribe_lazily`."""
-
-        def take(sample: Sample, came: float) -> None:
-            self.take(sample, lambda key, message: receiver(key, message, came))
-
-        registration = await self.bus.subscribe_lazily(pattern, take)
+        """The same with a lazy subscription."""
+        registration = await self.bus.subscribe(
+            pattern, lambda sample: self.take(sample, receiver, sample.came), lazy=True
+        )
         self._registrations.append(registration)
         return registration
 
@@ -144,8 +142,8 @@ class Messenger:
             self.take(sample, receiver)
         return len(answers)
 
-    def take(self, sample: Sample, receiver: Receiver) -> None:
-        """Check one sample and hand it on if it is a fresh message of another participant."""
+    def take(self, sample: Sample, receiver: Callable[..., None], *more: float) -> None:
+        """Check one sample and hand it on, and `more`, if it is a fresh message of another participant."""
         source = "an unknown key"
         try:
             key = self.keys.parse(sample.key)
@@ -162,7 +160,7 @@ class Messenger:
             return
         self.received += 1
         try:
-            receiver(key, message)
+            receiver(key, message, *more)
         except Exception:
             if self._drops.add("receiver", source):
                 _log.exception("a message of %s could not be used: its receiver failed", source)

@@ -12,15 +12,12 @@ Who is told of a sample does not change by that, nor when. Whoever made it close
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable
-from functools import partial
+from collections.abc import Iterable
 from itertools import product
-from typing import NamedTuple
 
 from lalliance_agents.bus.base import (
     Bus,
     Handler,
-    LazyHandler,
     Registration,
     Sample,
 )
@@ -32,29 +29,6 @@ from lalliance_agents.bus.wrapped import WrappedBus
 MOST_KEYS = 2**14
 
 
-#: A sample, and when it came, in seconds of the event loop's clock; 0 if nobody asks for that.
-_Arrival = tuple[Sample, float]
-_Deliver = Callable[[_Arrival], None]
-_Subscriber = Callable[[_Deliver], Awaitable[Registration]]
-
-
-class _Want(NamedTuple):
-    """What is subscribed to, and how."""
-
-    pattern: str
-    lazy: bool
-
-    def subscriber(self, bus: Bus) -> "_Subscriber":
-        """What subscribes to it on `bus`."""
-
-        async def subscribe(deliver: _Deliver) -> Registration:
-            if self.lazy:
-                return await bus.subscribe_lazily(self.pattern, lambda sample, came: deliver((sample, came)))
-            return await bus.subscribe(self.pattern, lambda sample: deliver((sample, 0.0)))
-
-        return subscribe
-
-
 class SharedBus(WrappedBus):
     """A bus for several participants; closing it closes the inner one.
 
@@ -64,7 +38,7 @@ class SharedBus(WrappedBus):
 
     def __init__(self, inner: Bus) -> None:
         super().__init__(inner)
-        self._channels: dict[_Want, _Channel] = {}
+        self._channels: dict[tuple[str, bool], _Channel] = {}
         self._wide: list[_Wide] = []
         self._questions: dict[tuple[str, bytes, float], asyncio.Task[list[Sample]]] = {}
 
@@ -73,30 +47,19 @@ class SharedBus(WrappedBus):
 
     def widen(self, patterns: Iterable[str], *, lazy: bool = False) -> None:
         """From now on, have subscriptions, or lazy ones, to what `patterns` match served by one for each of these."""
-        self._wide += [_Wide(_Want(pattern, lazy), self._inner) for pattern in patterns]
+        self._wide += [_Wide(pattern, self._inner, lazy=lazy) for pattern in patterns]
 
-    async def subscribe(self, pattern: str, handler: Handler) -> Registration:
+    async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool = False) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
-        inlet: Inlet[_Arrival] = Inlet(f"the subscription {pattern!r}", lambda arrival: handler(arrival[0]))
-        return await self._share(pattern, inlet)
-
-    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:
-        """The same without waking the loop: `handler` is called at the next `collect` of anybody, or before that."""
-        inlet: Inlet[_Arrival] = Inlet(
-            f"the lazy subscription {pattern!r}", lambda arrival: handler(*arrival), lazy=True
-        )
-        return await self._share(pattern, inlet)
-
-    async def _share(self, pattern: str, inlet: Inlet[_Arrival]) -> Registration:
         check_pattern(pattern)
-        want = _Want(pattern, inlet.lazy)
-        channel = self._channels.get(want)
+        inlet: Inlet[Sample] = Inlet(f"the subscription {pattern!r}", handler, lazy=lazy)
+        channel = self._channels.get((pattern, lazy))
         if channel is None:
-            channel = self._channels[want] = _Channel(want, self._channels)
+            channel = self._channels[pattern, lazy] = _Channel(pattern, self._channels, lazy=lazy)
         channel.inlets.append(inlet)
         try:
-            wide = next((wide for wide in self._wide if wide.covers(want)), None)
-            await channel.open(want.subscriber(self._inner) if wide is None else wide.subscriber(want))
+            wide = next((wide for wide in self._wide if wide.covers(pattern, lazy=lazy)), None)
+            await channel.open(self._inner if wide is None else wide)
         except BaseException:
             await channel.leave(inlet)
             raise
@@ -125,29 +88,31 @@ class SharedBus(WrappedBus):
 class _Channel:
     """One subscription of the inner bus, and those who share it; it is in `place` while there are any."""
 
-    def __init__(self, want: _Want, place: "dict[_Want, _Channel]") -> None:
-        self.inlets: list[Inlet[_Arrival]] = []
-        self._want = want
+    def __init__(self, pattern: str, place: "dict[tuple[str, bool], _Channel]", *, lazy: bool) -> None:
+        self.inlets: list[Inlet[Sample]] = []
+        self._pattern = pattern
+        self._lazy = lazy
         self._place = place
         self._opening = asyncio.Lock()
         self._registration: Registration | None = None
 
-    async def open(self, subscribe: _Subscriber) -> None:
+    async def open(self, source: "Bus | _Wide") -> None:
         """Subscribe, unless that was done before."""
         async with self._opening:
             if self._registration is None:
-                self._registration = await subscribe(self._deliver)
+                self._registration = await source.subscribe(self._pattern, self._deliver, lazy=self._lazy)
 
-    def _deliver(self, arrival: _Arrival) -> None:
+    def _deliver(self, sample: Sample) -> None:
         for inlet in tuple(self.inlets):
-            inlet.deliver(arrival)
+            inlet.deliver(sample)
 
-    async def leave(self, inlet: Inlet[_Arrival]) -> None:
+    async def leave(self, inlet: Inlet[Sample]) -> None:
         """Deliver nothing more to `inlet`; the subscription ends with the last of them."""
         inlet.is_open = False
         self.inlets.remove(inlet)
-        if not self.inlets and self._place.get(self._want) is self:
-            del self._place[self._want]
+        key = self._pattern, self._lazy
+        if not self.inlets and self._place.get(key) is self:
+            del self._place[key]
             async with self._opening:
                 if self._registration is not None:
                     await self._registration.close()
@@ -161,7 +126,7 @@ class _Channel:
 class _Share:
     """One participant's part in a channel."""
 
-    def __init__(self, inlet: Inlet[_Arrival], channel: _Channel) -> None:
+    def __init__(self, inlet: Inlet[Sample], channel: _Channel) -> None:
         self._inlet = inlet
         self._channel = channel
 
@@ -174,19 +139,20 @@ class _Share:
 class _Wide:
     """One subscription of the inner bus that serves all those to narrower patterns, for as long as there are any."""
 
-    def __init__(self, want: _Want, bus: Bus) -> None:
-        self._want = want
-        self._subscribe = want.subscriber(bus)
-        self._handlers: dict[str, _Deliver] = {}
-        self._routes: dict[str, list[_Deliver]] = {}
+    def __init__(self, pattern: str, bus: Bus, *, lazy: bool) -> None:
+        self._pattern = pattern
+        self._bus = bus
+        self._lazy = lazy
+        self._handlers: dict[str, Handler] = {}
+        self._routes: dict[str, list[Handler]] = {}
         self._opening = asyncio.Lock()
         self._registration: Registration | None = None
 
-    def covers(self, want: _Want) -> bool:
-        """Whether all that is wanted comes here, and in the same way."""
-        own, asked = self._want.pattern.split("/"), want.pattern.split("/")
+    def covers(self, pattern: str, *, lazy: bool) -> bool:
+        """Whether all that `pattern` matches comes here, and in the same way."""
+        own, asked = self._pattern.split("/"), pattern.split("/")
         return (
-            self._want.lazy == want.lazy
+            lazy == self._lazy
             and len(own) == len(asked)
             and all(
                 wide == narrow or (wide == "*" and narrow != "**" and not narrow.startswith("@"))
@@ -194,16 +160,13 @@ class _Wide:
             )
         )
 
-    def subscriber(self, want: _Want) -> _Subscriber:
-        """What subscribes here to `want`, which is covered, and to which nobody else here subscribes."""
-        return partial(self._enter, want.pattern)
-
-    async def _enter(self, pattern: str, deliver: _Deliver) -> Registration:
-        self._handlers[pattern] = deliver
+    async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool) -> Registration:  # noqa: ARG002 - it is covered
+        """Have `handler` called with each sample whose key matches `pattern`, to which nobody else here subscribes."""
+        self._handlers[pattern] = handler
         self._routes.clear()
         async with self._opening:
             if self._registration is None:
-                self._registration = await self._subscribe(self._deliver)
+                self._registration = await self._bus.subscribe(self._pattern, self._deliver, lazy=self._lazy)
         return _Narrow(self, pattern)
 
     async def leave(self, pattern: str) -> None:
@@ -216,17 +179,16 @@ class _Wide:
                 registration, self._registration = self._registration, None
                 await registration.close()
 
-    def _deliver(self, arrival: _Arrival) -> None:
-        key = arrival[0].key
-        route = self._routes.get(key)
+    def _deliver(self, sample: Sample) -> None:
+        route = self._routes.get(sample.key)
         if route is None:
             if len(self._routes) >= MOST_KEYS:
                 self._routes.clear()
-            route = self._routes[key] = self._find(key)
-        for deliver in route:
-            deliver(arrival)
+            route = self._routes[sample.key] = self._find(sample.key)
+        for handler in route:
+            handler(sample)
 
-    def _find(self, key: str) -> list[_Deliver]:
+    def _find(self, key: str) -> list[Handler]:
         """Those whose pattern matches `key`: each chunk of it is named there, or is a `*`."""
         chunks = [(chunk,) if chunk.startswith("@") else (chunk, "*") for chunk in key.split("/")]
         patterns = map("/".join, product(*chunks))

@@ -6,7 +6,6 @@ from lalliance_agents.bus.base import (
     ConnectionHandler,
     Delivery,
     Handler,
-    LazyHandler,
     PresenceHandler,
     Publication,
     Registration,
@@ -32,13 +31,9 @@ class WrappedBus(Bus):
         """Declare a key that will be published on often."""
         return await self._inner.publication(key, delivery)
 
-    async def subscribe(self, pattern: str, handler: Handler) -> Registration:
+    async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool = False) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
-        return await self._inner.subscribe(pattern, handler)
-
-    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:
-        """The same without waking the loop: `handler` is called at the next `collect`, or before that."""
-        return await self._inner.subscribe_lazily(pattern, handler)
+        return await self._inner.subscribe(pattern, handler, lazy=lazy)
 
     def collect(self) -> bool:
         """Have what came until now handled; of a flood only a part. False inside a handler, where it does nothing."""

@@ -18,15 +18,7 @@ from typing import Any, Protocol, TypeVar
 
 import zenoh
 
-from lalliance_agents.bus.base import (
-    Answer,
-    ConnectionHandler,
-    Delivery,
-    Handler,
-    LazyHandler,
-    PresenceHandler,
-    Sample,
-)
+from lalliance_agents.bus.base import Answer, ConnectionHandler, Delivery, Handler, PresenceHandler, Sample
 from lalliance_agents.bus.credentials import Credentials, check_fits
 from lalliance_agents.bus.inbox import Inbox, Inlet, Inquiry, QueuedBus, answers, check_timeout
 from lalliance_agents.bus.patterns import check_key, check_pattern
@@ -160,34 +152,19 @@ class ZenohBus(QueuedBus):
         )
         return ZenohPublication(publisher, self._declared)
 
-    async def subscribe(self, pattern: str, handler: Handler) -> "_Declared":
+    async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool = False) -> "_Declared":
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
         expression = self._expression(pattern)
+        name = f"the subscription {pattern!r}"
 
         def hear(raw: zenoh.Sample) -> None:
             handler(Sample(str(raw.key_expr), raw.payload.to_bytes()))
 
-        inlet: Inlet[zenoh.Sample] = Inlet(f"the subscription {pattern!r}", hear)
-        return self._declare(inlet, self._session.declare_subscriber(expression, self._listener(inlet)))
+        def hear_late(raw: tuple[zenoh.Sample, float]) -> None:
+            handler(Sample(str(raw[0].key_expr), raw[0].payload.to_bytes(), raw[1]))
 
-    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> "_Declared":
-        """The same without waking the loop: `handler` is called at the next `collect`, or before that."""
-        expression = self._expression(pattern)
-
-        def hear(arrival: tuple[zenoh.Sample, float]) -> None:
-            raw, came = arrival
-            handler(Sample(str(raw.key_expr), raw.payload.to_bytes()), came)
-
-        inlet = Inlet(f"the lazy subscription {pattern!r}", hear, lazy=True)
-        inbox, time = self._inbox, self._loop.time
-
-        def listen(raw: zenoh.Sample) -> None:
-            if not this_thread.known:
-                stay_known()
-            if inbox.admits(len(raw.payload)):
-                inbox.push(inlet, (raw, time()))
-
-        listener = zenoh.handlers.Callback(listen, indirect=False)
+        inlet = Inlet(name, hear_late, lazy=True) if lazy else Inlet(name, hear)
+        listener = self._stamping_listener(inlet) if lazy else self._listener(inlet)
         return self._declare(inlet, self._session.declare_subscriber(expression, listener))
 
     async def answer(self, pattern: str, handler: Answer) -> "_Declared":
@@ -294,6 +271,18 @@ class ZenohBus(QueuedBus):
                 inbox.push(inlet, raw)
             else:
                 inlet.discard(raw)
+
+        return zenoh.handlers.Callback(listen, indirect=False)
+
+    def _stamping_listener(self, inlet: Inlet[Any]) -> "zenoh.handlers.Callback[zenoh.Sample]":
+        """The same for samples alone, each of which goes with the instant at which it came."""
+        inbox, time = self._inbox, self._loop.time
+
+        def listen(raw: zenoh.Sample) -> None:
+            if not this_thread.known:
+                stay_known()
+            if inbox.admits(len(raw.payload)):
+                inbox.push(inlet, (raw, time()))
 
         return zenoh.handlers.Callback(listen, indirect=False)
 

@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from lalliance_agents.agent.host import Host
-from lalliance_agents.bus.base import Delivery, Handler, LazyHandler, Registration, Sample
+from lalliance_agents.bus.base import Delivery, Handler, Registration, Sample
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.shared import SharedBus
 from lalliance_agents.errors import MissionError
@@ -39,13 +39,9 @@ class Counting(MemoryBus):
         self.lazy_patterns: Counter[str] = Counter()
         self.questions: Counter[str] = Counter()
 
-    async def subscribe(self, pattern: str, handler: Handler) -> Registration:  # type: ignore[override]
-        self.patterns[pattern] += 1
-        return await super().subscribe(pattern, handler)
-
-    async def subscribe_lazily(self, pattern: str, handler: LazyHandler) -> Registration:  # type: ignore[override]
-        self.lazy_patterns[pattern] += 1
-        return await super().subscribe_lazily(pattern, handler)
+    async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool = False) -> Registration:  # type: ignore[override]
+        (self.lazy_patterns if lazy else self.patterns)[pattern] += 1
+        return await super().subscribe(pattern, handler, lazy=lazy)
 
     async def query(self, pattern: str, payload: bytes = b"", *, timeout: float) -> list[Sample]:  # noqa: ASYNC109
         self.questions[pattern] += 1
@@ -134,8 +130,8 @@ async def test_lazy_and_other_subscribers_of_the_same_share_nothing_but_the_bus(
         for pattern in ("m/k", "m/w/k"):
             await bus.subscribe(pattern, lambda sample: heard.append(("eager", sample.key, 0.0)))
             for name in ("one", "two"):
-                await bus.subscribe_lazily(
-                    pattern, lambda sample, came, name=name: heard.append((name, sample.key, came))
+                await bus.subscribe(
+                    pattern, lambda sample, name=name: heard.append((name, sample.key, sample.came)), lazy=True
                 )
         assert (inner.patterns, inner.lazy_patterns) == ({"m/k": 1, "m/w/k": 1}, {"m/k": 1, "m/w/*": 1})
         for key in ("m/k", "m/w/k"):

@@ -44,13 +44,9 @@ def mission(text: str = PAIR) -> Mission:
 class SlowBus(MemoryBus):
     """A memory bus on which a declaration takes a turn of the loop, as on a real one."""
 
-    async def subscribe(self, *given: Any) -> Any:
+    async def subscribe(self, *given: Any, **options: Any) -> Any:
         await asyncio.sleep(0)
-        return await super().subscribe(*given)
-
-    async def subscribe_lazily(self, *given: Any) -> Any:
-        await asyncio.sleep(0)
-        return await super().subscribe_lazily(*given)
+        return await super().subscribe(*given, **options)
 
     async def announce_presence(self, key: str) -> Any:
         await asyncio.sleep(0)

@@ -40,13 +40,13 @@ async def test_lazy_subscribers_hear_when_each_message_came_and_nothing_before_w
     loop = asyncio.get_running_loop()
     ear, times, nested = make_ear(), [], []
 
-    def hear_lazily(sample, came):
+    def hear_lazily(sample):
         ear(sample)
-        times.append(came)
+        times.append(sample.came)
         nested.append(right.collect())
 
     await right.subscribe("m/eager", ear)
-    registration = await right.subscribe_lazily("m/lazy", hear_lazily)
+    registration = await right.subscribe("m/lazy", hear_lazily, lazy=True)
     await linked(left, "m/eager", ear)
     await eventually(lambda: left.put("m/lazy", b"early", Delivery.STATE) or (right.collect() and ear.samples))
     left.put("m/eager", b"linked", Delivery.STATE)

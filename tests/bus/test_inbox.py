@@ -118,6 +118,28 @@ def test_a_flood_of_lazy_messages_wakes_the_loop_once_and_however_often_it_is_co
     assert heard == list(range(5 * BATCH))
 
 
+def test_who_collects_time_and_again_leaves_at_least_half_of_the_time_to_others() -> None:
+    loop, heard = Loop(), []
+    inbox = Inbox(loop.wake, loop)
+
+    def dawdle(number: int) -> None:
+        heard.append(number)
+        loop.now += 0.1
+
+    lazy = Inlet("lazy", dawdle, lazy=True)
+    for number in range(4):
+        inbox.push(lazy, number)
+        assert inbox.collect()
+    assert heard == [0]
+    loop.now += 0.09
+    assert inbox.collect()
+    assert heard == [0]
+    loop.now += 0.02
+    assert inbox.collect()
+    assert heard == [0, 1, 2, 3]
+    assert loop.scheduled == []
+
+
 def test_what_collecting_leaves_over_is_delivered_without_being_collected() -> None:
     turns, heard = Turns(), []
     inbox = Inbox(turns.wake)

@@ -68,14 +68,14 @@ class Stage:
     async def listen(self, *patterns: str) -> list[Registration]:
         return [await self.bus.subscribe(pattern, self.hear) for pattern in patterns or [KEYS.build(Kind.HEARTBEAT)]]
 
-    def hear_lazily(self, sample: Sample, came: float) -> None:
+    def hear_lazily(self, sample: Sample) -> None:
         """The same with the instant at which it came."""
         self.hear(sample)
-        self.log[-1] = (round(self.clock.at(came), 6), self.log[-1][1])
+        self.log[-1] = (round(self.clock.at(sample.came), 6), self.log[-1][1])
 
     async def listen_lazily(self, *patterns: str) -> list[Registration]:
         return [
-            await self.bus.subscribe_lazily(pattern, self.hear_lazily)
+            await self.bus.subscribe(pattern, self.hear_lazily, lazy=True)
             for pattern in patterns or [KEYS.build(Kind.HEARTBEAT)]
         ]
 
