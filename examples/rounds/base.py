@@ -1,4 +1,4 @@
-"""Behaviour sets for a mobile base under ROS 2: Nav2 drives it to places, and teammates hear which were visited."""
+"""Behaviour sets for a base under ROS 2: Nav2 drives it to places, and teammates hear which were visited."""
 
 import asyncio
 import threading
@@ -21,7 +21,8 @@ class Base:
     """The base. ROS calls back in a thread of its own, beside the robot's event loop."""
 
     def __init__(self) -> None:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # lalliance ends this process, and cleans up first
+        # Lalliance handles the signals that end this process, and has its sets clean up first.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node("lalliance_base")
         kept = QoSProfile(depth=len(PLACES), durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.visited: set[str] = set()
@@ -47,7 +48,7 @@ class Visit(AutonomousBehaviorSet):
         return not self.complete() and self.base.navigation.server_is_ready()
 
     async def perform(self) -> None:
-        """Drive there and return; if this is cancelled, so is the goal, and it has ended before the next set begins."""
+        """Drive there and return. Cancelled, it cancels the goal and waits for its end."""
         accepting = told(self.base.navigation.send_goal_async(self._goal()))
         try:
             goal = await asyncio.shield(accepting)
