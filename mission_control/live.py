@@ -1,5 +1,7 @@
 """The live view: who is on what, how motivated, how far. Where there is no terminal, one line per event."""
 
+import asyncio
+import sys
 from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -68,7 +70,11 @@ class Lines:
 
     def say(self, text: str) -> None:
         """Show a remark that is no message of the mission."""
-        self._console.print(printable(text), highlight=False, markup=False, soft_wrap=True)
+        try:
+            self._console.print(printable(text), highlight=False, markup=False, soft_wrap=True)
+        except SystemExit as nobody_reads:
+            # To end a task with it would tell so at length.
+            asyncio.get_running_loop().call_soon(sys.exit, nobody_reads.code)
 
 
 #: Events shown once more when the live view is left, so that the story is not gone with it.

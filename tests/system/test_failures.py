@@ -95,6 +95,17 @@ def test_a_running_mission_ends_within_two_seconds_of_ctrl_c(processes: Processe
     assert processes.alive() == []
 
 
+def test_a_run_that_nobody_reads_any_more_ends_without_a_word(processes: Processes, small: Path) -> None:
+    run = processes.start("run", small, "--speed", "2", "--plain")
+    read_until(run, "left is there")
+    assert run.stdout is not None
+    assert run.stderr is not None
+    run.stdout.close()
+    assert run.wait(timeout=100) == 1
+    assert run.stderr.read() == ""
+    until(lambda: processes.alive() == [])
+
+
 def test_a_mission_without_robots_left_ends_before_its_deadline(processes: Processes, small: Path) -> None:
     run = processes.start("run", small, "--speed", "2", "--plain")
     read_until(run, "right starts")
