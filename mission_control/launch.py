@@ -7,6 +7,7 @@ another alone.
 
 import asyncio
 import contextlib
+import logging
 import signal
 from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -35,6 +36,8 @@ from world_server.world import Stage, World
 if TYPE_CHECKING:
     from mission_control.dashboard.beside import Page
     from mission_control.recording.writer import RecordingWriter
+
+_log = logging.getLogger(__name__)
 
 #: What is shown of a mission.
 SHOWN = (Kind.EVENT, Kind.STATUS, Kind.DECISION, Kind.MOTIVATION, Kind.CHAOS_RULES)
@@ -258,9 +261,13 @@ class Launcher:
 
     async def _show(self, onlooker: Onlooker) -> None:
         async for sighting in onlooker:
-            with contextlib.suppress(MessageError):  # a key that somebody made up
+            try:
                 if self._keys.parse(sighting.key).robot in {None, *self._plan.mission.robots}:
                     self._view.take(sighting)
+            except MessageError:  # a key that somebody made up
+                pass
+            except Exception:
+                _log.exception("what was seen on %s could not be shown", sighting.key)
 
     async def _watch(self, bus: Bus) -> Messenger:
         keys = self._keys

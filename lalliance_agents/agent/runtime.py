@@ -209,9 +209,11 @@ class Robot:
         await self._save()
 
     def _tell(self, event: Event, at: float | None = None) -> None:
-        """Tell the mind of something that was perceived at the instant `at`, or now, after what had come by then."""
+        """Tell the mind of something that was perceived at the instant `at`, or now.
+
+        Nothing may be collected between the perception and this: it would be told the older one last.
+        """
         if at is None:
-            self._bus.collect()
             at = self._clock.now()
         # A thread may note that a message has come, and hand it over only after something later was told.
         self._told_until = max(self._told_until, at)
@@ -288,9 +290,13 @@ class Robot:
             self._tell(changed)
 
     def _body_failed(self, one: BehaviorSet) -> None:
-        self._tell(BodyFailed(one.task))
+        trial = self._trial
+        self._bus.collect()
+        if trial == self._trial:
+            self._tell(BodyFailed(one.task))
 
     def _body_returned(self, one: BehaviorSet) -> None:
+        self._bus.collect()
         self._feel(one)
 
     async def _tick_forever(self) -> None:

@@ -21,10 +21,14 @@ class DelayLine:
 
     Args:
         ring: called when the first sample is due, with the instant until which it is to `deliver`.
+
+    Attributes:
+        delivers: whether a handler is being called.
     """
 
     def __init__(self, ring: Callable[[float], object]) -> None:
         self._loop = asyncio.get_running_loop()
+        self.delivers = False
         self._ring = ring
         # A heap by due time; of two due at once the first that came, which is why they are numbered.
         self._waiting: list[tuple[float, int, Inlet[Sample], Sample]] = []
@@ -51,6 +55,7 @@ class DelayLine:
         """Deliver what is due by `until`, but no more than an inbox does in one turn of the loop."""
         if not self._waiting or self._waiting[0][0] > until:
             return
+        self.delivers = True
         try:
             for _ in range(BATCH):
                 if not self._waiting or self._waiting[0][0] > until:
@@ -59,6 +64,7 @@ class DelayLine:
                 self._size -= _size(sample)
                 inlet.deliver(sample._replace(came=due) if inlet.lazy else sample)
         finally:
+            self.delivers = False
             self._arm()
 
     def discard(self, inlet: Inlet[Sample] | None = None) -> None:

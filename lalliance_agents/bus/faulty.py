@@ -132,7 +132,7 @@ class FaultyBus(WrappedBus):
         return self._collect(self._loop.time())
 
     def _collect(self, until: float) -> bool:
-        collected = self._inner.collect()
+        collected = not self._line.delivers and self._inner.collect()
         if collected:
             self._line.deliver(until)
         return collected

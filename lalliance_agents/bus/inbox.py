@@ -24,6 +24,8 @@ BATCH = 256
 CAPACITY = 4096
 #: When messages throng, the loop takes what came in so many seconds at once.
 REST = 0.001
+#: Who collects often waits no longer than this for the next collection, in seconds.
+LONGEST_REST = 0.05
 
 Raw = TypeVar("Raw")
 
@@ -152,7 +154,8 @@ class Inbox:
     def collect(self) -> bool:
         """Deliver what waits, as far as it is a batch; only in the loop. False inside a handler, where it does nothing.
 
-        Where many collect, this takes no more than half of the time, and comes at most as often as the loop would be woken.
+        Where many collect, this comes at most as often as the loop would be woken, and leaves others as much time as it took.
+        But one that was held up itself, as a stopped process is, must not make the next ones wait for as long.
         """
         if self._delivers:
             return False
@@ -162,7 +165,7 @@ class Inbox:
                 self._deliver_batch()
             finally:
                 ended = self._time()
-                self._next_collection = ended + max(ended - began, REST)
+                self._next_collection = ended + min(max(ended - began, REST), LONGEST_REST)
                 if len(self) > 0 and not self._woken:
                     self._woken = True
                     self._wake_up()

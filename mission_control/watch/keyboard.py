@@ -8,7 +8,7 @@ import termios
 import tty
 from collections.abc import Callable, Iterator
 
-from mission_control.watch.screen import stoppable
+from mission_control.watch.screen import is_in_background, stoppable
 
 _NAMES = {
     b"\x1b[A": "up",
@@ -78,7 +78,7 @@ def _unbuffered(descriptor: int, show: Callable[[bool], None]) -> Iterator[bool]
     if not os.isatty(descriptor):
         yield True
         return
-    if _is_in_background(descriptor):
+    if is_in_background():
         yield False
         return
     before = termios.tcgetattr(descriptor)
@@ -96,12 +96,5 @@ def _unbuffered(descriptor: int, show: Callable[[bool], None]) -> Iterator[bool]
         with stoppable(take):
             yield True
     finally:
-        if not _is_in_background(descriptor):
+        if not is_in_background():
             termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
-
-
-def _is_in_background(descriptor: int) -> bool:
-    """Whether others have the terminal, which stops who changes it in the background."""
-    with contextlib.suppress(OSError):  # a terminal of another session, which nobody here is in the background of
-        return os.tcgetpgrp(descriptor) != os.getpgrp()
-    return False

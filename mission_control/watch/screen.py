@@ -20,6 +20,20 @@ def show(live: Live, shown: bool) -> None:
         live.stop()
 
 
+def is_in_background() -> bool:
+    """Whether others have the terminal of this process, which stops who changes it in the background."""
+    try:
+        terminal = os.open(os.ctermid(), os.O_RDONLY | os.O_NOCTTY)
+    except OSError:  # there is none
+        return False
+    try:
+        return os.tcgetpgrp(terminal) != os.getpgrp()
+    except OSError:  # it is gone
+        return False
+    finally:
+        os.close(terminal)
+
+
 @contextlib.contextmanager
 def stoppable(take: Callable[[bool], None]) -> Iterator[None]:
     """Have `take` called with False before this process is stopped from the terminal, and with True when it goes on.
@@ -28,18 +42,22 @@ def stoppable(take: Callable[[bool], None]) -> Iterator[None]:
     """
     loop = asyncio.get_running_loop()
 
+    def go_on() -> None:
+        if not is_in_background():  # from there it is brought to the foreground first
+            take(True)
+
     def stop() -> None:
         take(False)
         loop.remove_signal_handler(signal.SIGTSTP)
         os.kill(os.getpid(), signal.SIGTSTP)  # here it stands still, unless nobody could have it go on
         loop.add_signal_handler(signal.SIGTSTP, stop)
-        take(True)
+        go_on()
 
     if signal.getsignal(signal.SIGTSTP) is not signal.SIG_DFL:  # it is not to be stopped
         yield
         return
     loop.add_signal_handler(signal.SIGTSTP, stop)
-    loop.add_signal_handler(signal.SIGCONT, take, True)
+    loop.add_signal_handler(signal.SIGCONT, go_on)
     try:
         yield
     finally:

@@ -20,9 +20,10 @@ from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.messenger import Messenger
 from lalliance_agents.config import Mission
 from lalliance_agents.mission_file import parse_mission
+from lalliance_agents.model.events import BodyFailed, TrialStarted
 from lalliance_agents.model.monitor import Record
 from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
-from lalliance_agents.wire.messages import Action, Activity, DecisionMade, Hello, Message
+from lalliance_agents.wire.messages import Action, Activity, Blindness, DecisionMade, Hello, Message
 
 pytestmark = pytest.mark.virtual_time
 
@@ -165,6 +166,58 @@ async def test_a_robot_that_was_held_up_does_not_take_its_teammates_for_silent()
         assert max(silences[4:]) < tau
         presences = stage.robot.mind.hearing.presences
         assert [presences[name].lapses for name in ("right", "stranger")] == [0, 0]
+
+
+async def test_of_what_is_late_and_due_at_once_the_last_word_of_a_task_counts() -> None:
+    async with Stage() as stage:
+        await stage.begin()
+        late = Blindness(fault="1-blind", robot="left", delay=0.5)
+        stage.world.send(Kind.CHAOS_RULES, seed=1, rules=[], blind=[late])
+        await asyncio.sleep(0.5)
+        stage.sense("a")
+        await asyncio.sleep(0.001)
+        stage.sense("a", applicable=False, complete=True)
+        await asyncio.sleep(0.4)
+        hold_up(0.2)
+        await asyncio.sleep(2.0)
+        assert stage.decisions() == []
+
+
+async def test_what_a_set_said_before_the_next_trial_began_is_not_told_of_that_trial() -> None:
+    """The world's message of the next trial comes while the set is asked, at a control step."""
+
+    class Asked(BehaviorSet):
+        done = False
+
+        def complete(self) -> bool:
+            done, self.done = self.done, False
+            if done:
+                stage.sense("a", trial=2)
+            return done
+
+    asked = Asked("a")
+    async with Stage(asked) as stage:
+        await stage.begin()
+        stage.sense("a")
+        await asyncio.sleep(2.0)
+        asked.done = True
+        await asyncio.sleep(4.0)
+        assert ("activate", "a", 2) in stage.decisions()
+
+
+async def test_a_body_that_fails_as_the_next_trial_begins_fails_in_none() -> None:
+    async with Stage() as stage:
+        await stage.begin()
+        stage.sense("a")
+        await asyncio.sleep(2.0)
+        assert stage.decisions() == [("activate", "a", 1)]
+        told = []
+        handle = stage.robot.mind.handle
+        stage.robot.mind.handle = lambda event, now: told.append(type(event)) or handle(event, now)  # type: ignore[method-assign]
+        stage.sense("a", trial=2)
+        stage.robot._body_failed(stage.robot._repertoire["a"])
+        assert TrialStarted in told
+        assert BodyFailed not in told
 
 
 async def leave_nothing(stage: Stage, performed: Logged) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from lalliance_agents.bus.inbox import BATCH, CAPACITY, REST, Inbox, Inlet
+from lalliance_agents.bus.inbox import BATCH, CAPACITY, LONGEST_REST, REST, Inbox, Inlet
 
 
 class Turns:
@@ -124,20 +124,37 @@ def test_who_collects_time_and_again_leaves_at_least_half_of_the_time_to_others(
 
     def dawdle(number: int) -> None:
         heard.append(number)
-        loop.now += 0.1
+        loop.now += LONGEST_REST
 
     lazy = Inlet("lazy", dawdle, lazy=True)
     for number in range(4):
         inbox.push(lazy, number)
         assert inbox.collect()
     assert heard == [0]
-    loop.now += 0.09
+    loop.now += 0.9 * LONGEST_REST
     assert inbox.collect()
     assert heard == [0]
-    loop.now += 0.02
+    loop.now += 0.2 * LONGEST_REST
     assert inbox.collect()
     assert heard == [0, 1, 2, 3]
     assert loop.scheduled == []
+
+
+def test_a_collection_that_was_held_up_does_not_keep_the_next_ones_from_their_messages() -> None:
+    loop, heard = Loop(), []
+    inbox = Inbox(loop.wake, loop)
+
+    def stand_still(number: int) -> None:
+        heard.append(number)
+        loop.now += 5.0 if number == 0 else 0.0
+
+    lazy = Inlet("lazy", stand_still, lazy=True)
+    inbox.push(lazy, 0)
+    assert inbox.collect()
+    inbox.push(lazy, 1)
+    loop.now += LONGEST_REST
+    assert inbox.collect()
+    assert heard == [0, 1]
 
 
 def test_what_collecting_leaves_over_is_delivered_without_being_collected() -> None:
