@@ -11,6 +11,9 @@ from collections.abc import Callable, Iterator
 
 from rich.live import Live
 
+#: How often who goes on in the background looks whether it has the terminal again, in seconds.
+LOOK_AGAIN = 0.5
+
 
 def show(live: Live, shown: bool) -> None:
     """Take the screen, or give it back to who has the terminal meanwhile."""
@@ -42,8 +45,15 @@ def stoppable(take: Callable[[bool], None]) -> Iterator[None]:
     """
     loop = asyncio.get_running_loop()
 
+    waiting: asyncio.TimerHandle | None = None
+
     def go_on() -> None:
-        if not is_in_background():  # from there it is brought to the foreground first
+        nonlocal waiting
+        if waiting is not None:
+            waiting.cancel()
+        if is_in_background():  # nobody tells when that ends
+            waiting = loop.call_later(LOOK_AGAIN, go_on)
+        else:
             take(True)
 
     def stop() -> None:
@@ -63,3 +73,5 @@ def stoppable(take: Callable[[bool], None]) -> Iterator[None]:
     finally:
         loop.remove_signal_handler(signal.SIGTSTP)
         loop.remove_signal_handler(signal.SIGCONT)
+        if waiting is not None:
+            waiting.cancel()
