@@ -114,10 +114,10 @@ class Ear(MemoryBus):
 
     handler: Handler
 
-    async def subscribe(self, pattern: str, handler: Handler) -> Registration:  # type: ignore[override]  # MemoryBus promises its own kind of registration, which nobody here needs
+    async def subscribe(self, pattern: str, handler: Handler, **options: bool) -> Registration:  # type: ignore[override]  # MemoryBus promises its own kind of registration, which nobody here needs
         """Keep the handler, too."""
         self.handler = handler
-        return await super().subscribe(pattern, handler)
+        return await super().subscribe(pattern, handler, **options)
 
 
 def presence(numbers: Iterable[int]) -> Iterator[Sample]:
