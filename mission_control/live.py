@@ -1,7 +1,6 @@
 """The live view: who is on what, how motivated, how far. Where there is no terminal, one line per event."""
 
-import asyncio
-import sys
+import signal
 from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -72,9 +71,8 @@ class Lines:
         """Show a remark that is no message of the mission."""
         try:
             self._console.print(printable(text), highlight=False, markup=False, soft_wrap=True)
-        except SystemExit as nobody_reads:
-            # To end a task with it would tell so at length.
-            asyncio.get_running_loop().call_soon(sys.exit, nobody_reads.code)
+        except SystemExit:  # nobody reads it any more: the run ends as it does when it is told to
+            signal.raise_signal(signal.SIGTERM)
 
 
 #: Events shown once more when the live view is left, so that the story is not gone with it.

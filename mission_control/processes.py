@@ -119,8 +119,9 @@ class Child:
     def send_signal(self, number: signal.Signals) -> None:
         """Send a signal, unless it has ended."""
         if self.running:
+            # Not by the process's own `send_signal`, which would take the news of its end from asyncio if it has just ended.
             with contextlib.suppress(ProcessLookupError):
-                self._process.send_signal(number)
+                os.kill(self.pid, number)
 
     def stop(self) -> None:
         """Have it make no further step until it is continued."""
