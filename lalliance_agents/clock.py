@@ -43,4 +43,4 @@ class MissionClock:
         return self._loop.call_at(self._real(instant), callback)
 
     def _real(self, instant: float) -> float:
-        return self._born + (instant - self._since) / self._speed
+        return self._born + self.lasts(instant - self._since)

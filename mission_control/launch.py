@@ -254,7 +254,7 @@ class Launcher:
     @contextlib.asynccontextmanager
     async def _shown(self, bus: Bus) -> AsyncIterator[None]:
         """Have the view show what happens, also what was not heard while the router was away, until it is up to date."""
-        onlooker = Onlooker(bus, self._plan.mission.name, self._clock, motivations=True, kinds=SHOWN)
+        onlooker = Onlooker(bus, self._plan.mission.name, self._clock, kinds=SHOWN)
         async with contextlib.AsyncExitStack() as last, onlooker:
             last.push_async_callback(asyncio.gather, asyncio.create_task(self._show(onlooker)))
             yield

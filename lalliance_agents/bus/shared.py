@@ -12,7 +12,8 @@ Who is told of a sample does not change by that, nor when. Whoever made it close
 """
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
 from itertools import product
 
 from lalliance_agents.bus.base import (
@@ -24,6 +25,9 @@ from lalliance_agents.bus.base import (
 from lalliance_agents.bus.inbox import Inlet
 from lalliance_agents.bus.patterns import check_pattern
 from lalliance_agents.bus.wrapped import WrappedBus
+
+#: The pattern of a subscription, and whether it is lazy.
+_Want = tuple[str, bool]
 
 #: Keys of which it is remembered whom they are for; whoever makes up keys fills no more than this.
 MOST_KEYS = 2**14
@@ -38,7 +42,7 @@ class SharedBus(WrappedBus):
 
     def __init__(self, inner: Bus) -> None:
         super().__init__(inner)
-        self._channels: dict[tuple[str, bool], _Channel] = {}
+        self._channels: dict[_Want, _Channel] = {}
         self._wide: list[_Wide] = []
         self._questions: dict[tuple[str, bytes, float], asyncio.Task[list[Sample]]] = {}
 
@@ -55,11 +59,11 @@ class SharedBus(WrappedBus):
         inlet: Inlet[Sample] = Inlet(f"the subscription {pattern!r}", handler, lazy=lazy)
         channel = self._channels.get((pattern, lazy))
         if channel is None:
-            channel = self._channels[pattern, lazy] = _Channel(pattern, self._channels, lazy=lazy)
+            channel = self._channels[pattern, lazy] = _Channel((pattern, lazy), self._channels)
         channel.inlets.append(inlet)
         try:
             wide = next((wide for wide in self._wide if wide.covers(pattern, lazy=lazy)), None)
-            await channel.open(self._inner if wide is None else wide)
+            await channel.open(partial(self._inner.subscribe, lazy=lazy) if wide is None else wide.subscribe)
         except BaseException:
             await channel.leave(inlet)
             raise
@@ -88,19 +92,18 @@ class SharedBus(WrappedBus):
 class _Channel:
     """One subscription of the inner bus, and those who share it; it is in `place` while there are any."""
 
-    def __init__(self, pattern: str, place: "dict[tuple[str, bool], _Channel]", *, lazy: bool) -> None:
+    def __init__(self, want: _Want, place: "dict[_Want, _Channel]") -> None:
         self.inlets: list[Inlet[Sample]] = []
-        self._pattern = pattern
-        self._lazy = lazy
+        self._want = want
         self._place = place
         self._opening = asyncio.Lock()
         self._registration: Registration | None = None
 
-    async def open(self, source: "Bus | _Wide") -> None:
+    async def open(self, subscribe: Callable[[str, Handler], Awaitable[Registration]]) -> None:
         """Subscribe, unless that was done before."""
         async with self._opening:
             if self._registration is None:
-                self._registration = await source.subscribe(self._pattern, self._deliver, lazy=self._lazy)
+                self._registration = await subscribe(self._want[0], self._deliver)
 
     def _deliver(self, sample: Sample) -> None:
         for inlet in tuple(self.inlets):
@@ -110,9 +113,8 @@ class _Channel:
         """Deliver nothing more to `inlet`; the subscription ends with the last of them."""
         inlet.is_open = False
         self.inlets.remove(inlet)
-        key = self._pattern, self._lazy
-        if not self.inlets and self._place.get(key) is self:
-            del self._place[key]
+        if not self.inlets and self._place.get(self._want) is self:
+            del self._place[self._want]
             async with self._opening:
                 if self._registration is not None:
                     await self._registration.close()
@@ -160,7 +162,7 @@ class _Wide:
             )
         )
 
-    async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool) -> Registration:  # noqa: ARG002 - it is covered
+    async def subscribe(self, pattern: str, handler: Handler) -> Registration:
         """Have `handler` called with each sample whose key matches `pattern`, to which nobody else here subscribes."""
         self._handlers[pattern] = handler
         self._routes.clear()

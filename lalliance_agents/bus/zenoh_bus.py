@@ -155,17 +155,13 @@ class ZenohBus(QueuedBus):
     async def subscribe(self, pattern: str, handler: Handler, *, lazy: bool = False) -> "_Declared":
         """Have `handler` called with each sample whose key matches `pattern`, from about now on."""
         expression = self._expression(pattern)
-        name = f"the subscription {pattern!r}"
 
-        def hear(raw: zenoh.Sample) -> None:
-            handler(Sample(str(raw.key_expr), raw.payload.to_bytes()))
+        def hear(raw: zenoh.Sample, came: float = 0.0) -> None:
+            handler(Sample(str(raw.key_expr), raw.payload.to_bytes(), came))
 
-        def hear_late(raw: tuple[zenoh.Sample, float]) -> None:
-            handler(Sample(str(raw[0].key_expr), raw[0].payload.to_bytes(), raw[1]))
-
-        inlet = Inlet(name, hear_late, lazy=True) if lazy else Inlet(name, hear)
-        listener = self._stamping_listener(inlet) if lazy else self._listener(inlet)
-        return self._declare(inlet, self._session.declare_subscriber(expression, listener))
+        accept: Callable[[Any], None] = (lambda stamped: hear(*stamped)) if lazy else hear
+        inlet: Inlet[Any] = Inlet(f"the subscription {pattern!r}", accept, lazy=lazy)
+        return self._declare(inlet, self._session.declare_subscriber(expression, self._listener(inlet)))
 
     async def answer(self, pattern: str, handler: Answer) -> "_Declared":
         """Answer queries that match `pattern` with the samples that `handler` returns."""
@@ -260,29 +256,17 @@ class ZenohBus(QueuedBus):
         return _Declared(entity, inlet, self._declared)
 
     def _listener(self, inlet: Inlet[Any]) -> "zenoh.handlers.Callback[Any]":
-        """What Zenoh calls, in its own threads, with each message for `inlet`."""
-        inbox = self._inbox
+        """What Zenoh calls, in its own threads, with each message for `inlet`; a lazy one gets it with when it came."""
+        inbox, lazy, time = self._inbox, inlet.lazy, self._loop.time
 
         def listen(raw: zenoh.Sample | zenoh.Query) -> None:
             if not this_thread.known:
                 stay_known()
             payload = raw.payload
             if payload is None or inbox.admits(len(payload)):
-                inbox.push(inlet, raw)
+                inbox.push(inlet, (raw, time()) if lazy else raw)
             else:
                 inlet.discard(raw)
-
-        return zenoh.handlers.Callback(listen, indirect=False)
-
-    def _stamping_listener(self, inlet: Inlet[Any]) -> "zenoh.handlers.Callback[zenoh.Sample]":
-        """The same for samples alone, each of which goes with the instant at which it came."""
-        inbox, time = self._inbox, self._loop.time
-
-        def listen(raw: zenoh.Sample) -> None:
-            if not this_thread.known:
-                stay_known()
-            if inbox.admits(len(raw.payload)):
-                inbox.push(inlet, (raw, time()))
 
         return zenoh.handlers.Callback(listen, indirect=False)
 

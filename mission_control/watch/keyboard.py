@@ -86,7 +86,7 @@ def _unbuffered(descriptor: int, show: Callable[[bool], None]) -> Iterator[bool]
     def take(taken: bool) -> None:
         if taken:
             with contextlib.suppress(termios.error):  # the terminal is gone
-                tty.setcbreak(descriptor)  # in the background, here it stands still again
+                tty.setcbreak(descriptor)
         else:
             termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
         show(taken)

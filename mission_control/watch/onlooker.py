@@ -59,7 +59,8 @@ class Onlooker:
         motivations: whether to listen to motivations too; robots publish them only while somebody does.
         capacity: sightings that may wait to be fetched.
         only: a pattern of keys: nothing else is looked at, and of what there was before only last values are asked for.
-        kinds: nothing else is looked at; the rules in force have to be among them, as the world is known by its answer.
+        kinds: nothing else is looked at, whatever `motivations` says; the rules in force have to be among them, as the world is
+            known by its answer.
         asks: whether to ask for what there was before, or was said in a gap.
         notice: called with each gap, once it is over and what could be recovered is among the sightings.
 
@@ -73,7 +74,7 @@ class Onlooker:
         mission: str,
         clock: MissionClock,
         *,
-        motivations: bool,
+        motivations: bool = False,
         capacity: int = CAPACITY,
         only: str | None = None,
         kinds: Collection[Kind] | None = None,
