@@ -4,220 +4,23 @@ import asyncio
 import contextlib
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import pytest
-from support.virtual_time import hold_up
+from support.robot_stage import PAIR, Logged, Stage, mission
 
 from lalliance_agents import BehaviorSet, Robot
 from lalliance_agents.agent import runtime
 from lalliance_agents.agent.behavior import AutonomousBehaviorSet
 from lalliance_agents.agent.catalog import Catalog
 from lalliance_agents.bus.base import Sample
-from lalliance_agents.bus.inbox import BATCH
 from lalliance_agents.bus.memory import MemoryBus, MemoryHub
 from lalliance_agents.bus.messenger import Messenger
-from lalliance_agents.config import Mission
-from lalliance_agents.mission_file import parse_mission
-from lalliance_agents.model.events import BodyFailed, TrialStarted
 from lalliance_agents.model.monitor import Record
 from lalliance_agents.wire.keys import WORLD, Key, Keys, Kind
-from lalliance_agents.wire.messages import Action, Activity, Blindness, DecisionMade, Hello, Message
+from lalliance_agents.wire.messages import Action, Activity, DecisionMade, Hello, Message
 
 pytestmark = pytest.mark.virtual_time
-
-PAIR = """
-name: pair
-tasks: {a: {}, b: {}}
-robots:
-  left: {tasks: {a: 2, b: 6}}
-  right: {tasks: {a: 6, b: 2}}
-knowledge: given
-parameters: {min_delay: 0.1, max_delay: 0.5}
-"""
-
-
-def mission(text: str = PAIR) -> Mission:
-    return parse_mission(text, "test.yaml")
-
-
-class SlowBus(MemoryBus):
-    """A memory bus on which a declaration takes a turn of the loop, as on a real one."""
-
-    async def subscribe(self, *given: Any, **options: Any) -> Any:
-        await asyncio.sleep(0)
-        return await super().subscribe(*given, **options)
-
-    async def announce_presence(self, key: str) -> Any:
-        await asyncio.sleep(0)
-        return await super().announce_presence(key)
-
-
-class Stage:
-    """One robot of a mission on a bus, with the rest of the world played by the test."""
-
-    def __init__(self, *behaviors: BehaviorSet, **more: Any) -> None:
-        self.hub = MemoryHub()
-        self.mission = more.pop("mission", None) or mission()
-        self.keys = Keys(self.mission.name)
-        self.bus = SlowBus(self.hub)
-        self.robot = Robot(self.mission, "left", bus=self.bus, behaviors=behaviors, incarnation=1, **more)
-        self.messages: list[Message] = []
-        self.present: list[tuple[str, bool]] = []
-        self._own = MemoryBus(self.hub)
-        self.world = self.voice(WORLD)
-        self.task: asyncio.Task[str]
-
-    def voice(self, name: str) -> Messenger:
-        return Messenger(self._own, self.keys, name, 1, asyncio.get_running_loop().time)
-
-    async def __aenter__(self) -> Self:
-        ear = self.voice("@ear")
-        for kind in (Kind.ACTIVITY, Kind.HEARTBEAT, Kind.HELLO, Kind.ACTION, Kind.DECISION, Kind.LINK):
-            await ear.listen(self.keys.build(kind), lambda _, message: self.messages.append(message))
-        await self._own.watch_presence(
-            self.keys.build(Kind.ALIVE), lambda key, present: self.present.append((key.rsplit("/", 1)[-1], present))
-        )
-        self.task = asyncio.create_task(self.robot.run())
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.task.cancel()
-        await asyncio.wait({self.task})
-        await self.bus.close()
-        await self._own.close()
-
-    def sense(self, task: str, trial: int = 1, **fields: Any) -> None:
-        """The world says that `task` can be worked on, unless said otherwise."""
-        fields = {"learning": "adaptive", "applicable": True, "complete": False, "progress": 0.0} | fields
-        self.world.send(Kind.SENSE_TASK, key_task=task, trial=trial, **fields)
-
-    def say(self, stage: str, trial: int = 1) -> None:
-        """The world says how the mission stands."""
-        self.world.send(Kind.SENSE_ROBOT, key_robot="left", mission=stage, trial=trial, learning="adaptive")
-
-    async def begin(self) -> None:
-        """The mission begins as soon as the robot has joined, which takes no time on this bus."""
-        await asyncio.sleep(0.001)
-        self.say("running")
-
-    def decisions(self) -> list[tuple[str, str, int]]:
-        return [(m.verb, m.task, m.trial) for m in self.messages if isinstance(m, DecisionMade)]
-
-
-class Logged(BehaviorSet):
-    """Always applicable by its own sensing; logs what it does."""
-
-    def __init__(self, task: str, *, returns_after: float | None = None) -> None:
-        super().__init__(task)
-        self.log: list[str] = []
-        self.began = asyncio.Event()
-        self._returns_after = returns_after
-
-    def applicable(self) -> bool:
-        return True
-
-    def complete(self) -> bool:
-        return self.returned
-
-    async def perform(self) -> None:
-        self.log.append("begins")
-        self.began.set()
-        try:
-            await asyncio.sleep(1e6 if self._returns_after is None else self._returns_after)
-        finally:
-            self.log.append("ends")
-
-
-async def test_a_teammate_counts_as_heard_when_its_message_came_not_when_it_was_collected() -> None:
-    async with Stage() as stage:
-        await stage.begin()
-        mate, presences = stage.voice("right"), stage.robot.mind.hearing.presences
-        loop = asyncio.get_running_loop()
-        for wait in (0.5, 0.13, 0.02, 0.31):
-            await asyncio.sleep(wait)
-            came = loop.time()
-            mate.send(Kind.HEARTBEAT, trial=1)
-            await asyncio.sleep(2 * stage.mission.control_period)
-            assert presences["right"].last == pytest.approx(came)
-
-
-async def test_a_robot_that_was_held_up_does_not_take_its_teammates_for_silent() -> None:
-    """It meets only a part of what waited before its next step, and the rest after it."""
-    async with Stage() as stage:
-        await stage.begin()
-        mates = [stage.voice("right"), stage.voice("stranger")]
-        mates[1].send(Kind.HELLO, tasks=["a"])
-        await asyncio.sleep(0.5)
-        tau = stage.mission.parameters.silence_timeout
-        for _ in range(BATCH):
-            mates[0].send(Kind.HEARTBEAT, trial=1)
-            mates[1].send(Kind.HEARTBEAT, trial=1)
-        hold_up(2 * tau)
-        mates[0].send(Kind.HEARTBEAT, trial=1)
-        await asyncio.sleep(0)
-        silences = []
-        for _ in range(20):
-            silences += stage.robot.mind.hearing.silences(asyncio.get_running_loop().time()).values()
-            await asyncio.sleep(0.01)
-        assert max(silences[4:]) < tau
-        presences = stage.robot.mind.hearing.presences
-        assert [presences[name].lapses for name in ("right", "stranger")] == [0, 0]
-
-
-async def test_of_what_is_late_and_due_at_once_the_last_word_of_a_task_counts() -> None:
-    async with Stage() as stage:
-        await stage.begin()
-        late = Blindness(fault="1-blind", robot="left", delay=0.5)
-        stage.world.send(Kind.CHAOS_RULES, seed=1, rules=[], blind=[late])
-        await asyncio.sleep(0.5)
-        stage.sense("a")
-        await asyncio.sleep(0.001)
-        stage.sense("a", applicable=False, complete=True)
-        await asyncio.sleep(0.4)
-        hold_up(0.2)
-        await asyncio.sleep(2.0)
-        assert stage.decisions() == []
-
-
-async def test_what_a_set_said_before_the_next_trial_began_is_not_told_of_that_trial() -> None:
-    """The world's message of the next trial comes while the set is asked, at a control step."""
-
-    class Asked(BehaviorSet):
-        done = False
-
-        def complete(self) -> bool:
-            done, self.done = self.done, False
-            if done:
-                stage.sense("a", trial=2)
-            return done
-
-    asked = Asked("a")
-    async with Stage(asked) as stage:
-        await stage.begin()
-        stage.sense("a")
-        await asyncio.sleep(2.0)
-        asked.done = True
-        await asyncio.sleep(4.0)
-        assert ("activate", "a", 2) in stage.decisions()
-
-
-async def test_a_body_that_fails_as_the_next_trial_begins_fails_in_none() -> None:
-    async with Stage() as stage:
-        await stage.begin()
-        stage.sense("a")
-        await asyncio.sleep(2.0)
-        assert stage.decisions() == [("activate", "a", 1)]
-        told = []
-        handle = stage.robot.mind.handle
-        stage.robot.mind.handle = lambda event, now: told.append(type(event)) or handle(event, now)  # type: ignore[method-assign]
-        stage.sense("a", trial=2)
-        stage.robot._body_failed(stage.robot._repertoire["a"])
-        assert TrialStarted in told
-        assert BodyFailed not in told
 
 
 async def leave_nothing(stage: Stage, performed: Logged) -> None:
